@@ -7,6 +7,7 @@ list(FILTER hot INCLUDE REGEX "^src/(backends|bvh|paper|traverse)/")
 set(cold ${hpccd_sources})
 list(REMOVE_ITEM cold ${hot})
 add_library(hpccd_core_hot OBJECT ${hot})
+set_target_properties(hpccd_core_hot PROPERTIES UNITY_BUILD OFF)  # whatever CMAKE_UNITY_BUILD of a parent project says
 add_library(hpccd_core_cold OBJECT ${cold})
 hpccd_compile_all_kernels(hpccd_core_hot)
 # The standard headers cost a source of the hot part half of its time; precompiled they change nothing in its object.

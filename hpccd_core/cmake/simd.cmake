@@ -16,7 +16,7 @@ endfunction()
 
 # hpccd_compile_all_kernels(target): for every set that the processor's family may have.
 function(hpccd_compile_all_kernels target)
-  # g++ 12 warns of subscript 1 of an array of two.
+  # -Wno-array-bounds: g++ 12 warns of subscript 1 of an array of two.
   hpccd_compile_kernels(${target} scalar -Wno-array-bounds)
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64|amd64")
     hpccd_compile_kernels(${target} avx2 -mavx2 -mbmi -Wno-psabi -Wno-array-bounds)
@@ -25,7 +25,7 @@ function(hpccd_compile_all_kernels target)
       -mprefer-vector-width=512 -Wno-psabi -Wno-maybe-uninitialized -Wno-uninitialized -Wno-array-bounds)
     target_compile_definitions(${target} PUBLIC HPCCD_X86)
   elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|AARCH64|arm64|ARM64")
-    hpccd_compile_kernels(${target} neon)
+    hpccd_compile_kernels(${target} neon -Wno-array-bounds)
     target_compile_definitions(${target} PUBLIC HPCCD_ARM64)
   endif()
 endfunction()

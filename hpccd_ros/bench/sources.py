@@ -6,7 +6,9 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import os
+import tokenize
 import zipfile
+import zlib
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -24,8 +26,12 @@ MESH_STEPS = 32  # of a mesh file
 STEP = {"vertices_t0", "vertices_t1", "faces"}  # of an .npz file
 TRUTH = {"vf": (2,), "ee": (4,), "vf_toc": (), "ee_toc": ()}  # and of its contacts, each row
 TRUTH_SHAPES = "vf (N,2), vf_toc (N,), ee (M,4), ee_toc (M,)"
-# BadZipFile: cut off. TypeError: an array alone, which is no archive.
-UNREADABLE = (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile)
+# TypeError: an array alone, which is no archive. The others: what zipfile and numpy raise of damaged files and of files
+# packed in ways that they do not know.
+UNREADABLE = (
+    *(OSError, ValueError, TypeError, EOFError, NotImplementedError, RuntimeError),
+    *(zipfile.BadZipFile, zlib.error, tokenize.TokenError),
+)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -51,7 +57,7 @@ class Step:
         scene = hc.Scene()
         for mesh in self.meshes:
             how = {"n_vertices": mesh.n_vertices, "static": mesh.static, "self_collision": mesh.self_collision}
-            scene.add_mesh(mesh.name, mesh.faces, **how)
+            scene.add_mesh(mesh.name, mesh.faces, edges=mesh.edges, **how)
         for a, b in self.ignored_pairs:
             scene.ignore_pair(a, b)
         return scene
@@ -120,11 +126,10 @@ def resolve(words: Sequence[str], data: Path | None, default: Sequence[str], siz
         raise UserError(
             "nothing to measure: name a scene (see `hpccd scene --list`), a recording or a mesh file, or set HPCCD_DATA"
         )
-    # Files of one name in several folders get names of their own: results are kept by name.
+    # Files of one name get names of their own: results are kept by name.
     names = [source.name for _, source in found]
     return [
-        dataclasses.replace(source, name=str(Path(word).with_suffix(""))) if names.count(source.name) > 1 else source
-        for word, source in found
+        dataclasses.replace(source, name=word) if names.count(source.name) > 1 else source for word, source in found
     ]
 
 
@@ -253,7 +258,7 @@ def of_recording(path: Path) -> Source:
         if not before.same_scene(after):
             return None
         meshes = tuple(
-            Mesh(m.name, t.faces, t.n_vertices, m.static, m.self_collision)
+            Mesh(m.name, t.faces, t.n_vertices, m.static, m.self_collision, t.edges)
             for m, t in zip(builder.meshes, after.topologies, strict=True)
         )
         ends = builder.concatenate(before, after), builder.concatenate(after, after)

@@ -15,13 +15,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Mesh:
-    """`faces` is (F,3) uint32 into the mesh's own `n_vertices` vertices; of a scene: as it is in frame 0."""
+    """`faces` is (F,3) uint32 into the mesh's own `n_vertices` vertices; of a scene: as it is in frame 0.
+
+    edges   (E,2) uint32 of edges that belong to no face, as those of ropes
+    """
 
     name: str
     faces: np.ndarray
     n_vertices: int
     static: bool = False
     self_collision: bool = True
+    edges: np.ndarray | tuple[()] = ()
 
 
 @dataclass(frozen=True)

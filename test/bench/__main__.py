@@ -4,8 +4,9 @@
   make bench BENCH_ARGS="scaling"           or: PYTHONPATH=test python -m bench scaling
   python -m bench <subject> --help          scenes, options and examples of one subject
 
-Every subject takes generated scenes (`hpccd scene --list`), the files of the folder HPCCD_DATA, or any recording of
-`hpccd record`. Variants run in turn on the same steps; close other programs first: the result says how busy they were.
+Most subjects take generated scenes (`hpccd scene --list`), the files of the folder HPCCD_DATA, or any recording of
+`hpccd record`; --help of a subject says which. Variants run in turn on the same steps; close other programs first: the
+result says how busy they were.
 """
 
 import argparse

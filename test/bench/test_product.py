@@ -5,9 +5,12 @@ import collections
 
 import numpy as np
 import pytest
+from bag_tools import typestore
+from base_bags import SECOND, Maker
 from sources import ROOT
 
 import hpccd_core as hc
+from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.bench import accuracy, sources
 from hpccd_ros.bench.report import Report
 
@@ -36,6 +39,42 @@ def test_a_recording_and_a_mesh_file(product, tmp_path):
     assert status == 0 and recorded["scene"] == "cloth-drop-small" and recorded["contacts"] > 0
     assert (mesh["scene"], mesh["triangles"], mesh["steps"]) == ("part", 8, 4)
     assert mesh["contacts"] > 0, "the copy moves through the mesh"
+
+
+def ropes_that_cross(path):
+    """Record two ropes along x and y; the second falls through the first in the third of five steps."""
+    store, line = typestore(), np.linspace(-1, 1, 4)
+    make = Maker(store)
+    types = {f"/meshes/{m}/{k.lower()}": f"hpccd/msg/Mesh{k}" for m in "ab" for k in ("Topology", "Vertices")}
+    node = {"format": 1, "hpccd": "0", "node": "/hpccd", "parameters": {"meshes": ["a", "b"], "frame_id": "world"}}
+    bag = BagWriter(path, info={**node, "topics": {topic: topic[1:] for topic in types}})
+    for topic, kind in types.items():
+        bag.add_topic(Topic(topic, kind, []))
+    times = iter(range(10**18, 2 * 10**18, 10**6))
+
+    def write(topic, message):
+        time = next(times)
+        bag.write(topic, bytes(store.serialize_cdr(message, types[topic])), time, time, 1 + time % 10**18)
+
+    topology = store.types["hpccd/msg/MeshTopology"]
+    edges = np.array([0, 1, 1, 2, 2, 3], np.uint32)
+    for mesh in "ab":
+        given = {"version": 0, "n_vertices": 4, "faces": np.zeros(0, np.uint32), "edges": edges}
+        write(f"/meshes/{mesh}/topology", topology(header=make.header(0, ""), **given))
+    for k in range(6):
+        ends = {"a": (line, 0 * line, 0 * line), "b": (0 * line + 0.05, line + 0.03, 0 * line + 0.25 - 0.1 * k)}
+        for mesh, xyz in ends.items():
+            write(f"/meshes/{mesh}/vertices", make.vertices((k + 1) * SECOND, k, np.stack(xyz, axis=1)))
+    bag.close()
+
+
+def test_ropes_of_a_recording_keep_their_edges(tmp_path):
+    path = tmp_path / "ropes.mcap"
+    ropes_that_cross(path)
+    source = sources.of_recording(path)
+    steps = [source.step(k) for k in range(source.n_steps)]
+    found = [hc.Detector(s.scene(), backend="cpu").detect(s.vertices_t0, s.vertices_t1) for s in steps]
+    assert [len(contacts) for contacts in found] == [0, 0, 1, 0, 0]
 
 
 def test_tiers(product):
@@ -79,12 +118,13 @@ def test_other_contacts_fail(product, monkeypatch):
 
 def test_files_of_one_name_are_told_apart(tmp_path):
     """Results are kept by name: of two the second would count for nothing."""
-    paths = [tmp_path / folder / "run.npz" for folder in ("a", "b")]
-    for path in paths:
+    paths = [tmp_path / name for name in ("a/run.npz", "b/run.npz", "b/run.obj")]
+    for path in paths[:2]:
         path.parent.mkdir()
         np.savez(path, **STEP)
+    paths[2].write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     names = [source.name for source in sources.resolve([*map(str, paths), "folding-strip"], None, ())]
-    assert names == [str(tmp_path / "a" / "run"), str(tmp_path / "b" / "run"), "folding-strip"]
+    assert names == [*map(str, paths), "folding-strip"]
     assert [source.name for source in sources.resolve([str(paths[0])], None, ())] == ["run"]
 
 
@@ -167,13 +207,19 @@ def test_files_that_hold_no_step(product, tmp_path, capfd, arrays, says):
     assert status == 2 and says in capfd.readouterr().err
 
 
-@pytest.mark.parametrize("kind", ["cut off", "an array alone", "text"])
+@pytest.mark.parametrize("kind", ["cut off", "an array alone", "text", "a byte changed"])
 def test_files_that_cannot_be_read(product, tmp_path, capfd, kind):
     folder, path = tmp_path / "data", tmp_path / "data" / "bad.npz"
     folder.mkdir()
     if kind == "an array alone":
         with path.open("wb") as file:
             np.save(file, np.eye(3))
+    elif kind == "a byte changed":
+        np.savez_compressed(path, **STEP)
+        content = bytearray(path.read_bytes())
+        # Where the first array begins: behind 30 bytes, its name and what else is said of it. 7: no block of zlib.
+        content[30 + int.from_bytes(content[26:28], "little") + int.from_bytes(content[28:30], "little")] = 7
+        path.write_bytes(content)
     else:
         np.savez(path, **STEP)
         path.write_bytes(path.read_bytes()[:200] if kind == "cut off" else b"no step")

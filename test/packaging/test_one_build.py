@@ -100,7 +100,8 @@ def test_a_changed_header_compiles_all_gpu_sources_that_include_it(copy):
 
 def test_the_gpu_backends_are_compiled_where_there_is_a_gpu_or_on_demand(copy):
     assert re.search(r"CUDA: \S+/cuda/bin/nvcc, for sm_90", configure(copy, "-DHPCCD_CUDA=ON"))
-    assert "GPU backends are not compiled (HPCCD_CUDA=OFF)" in configure(copy, "-DHPCCD_CUDA=OFF")
+    for off in ("OFF", "off", "0"):
+        assert "GPU backends are not compiled (HPCCD_CUDA=OFF)" in configure(copy, f"-DHPCCD_CUDA={off}")
     printed = configure(copy, "-DHPCCD_CUDA=AUTO", "-DHPCCD_NVIDIA_SMI=/bin/false")
     if any(Path("/dev", file).exists() for file in ("nvidiactl", "nvidia0", "nvhost-gpu", "nvgpu")):
         assert "nvcc, for sm_90" in printed

@@ -10,6 +10,7 @@
 #include "gpu/counters.cuh"
 #include "gpu/device_box.cuh"
 #include "gpu/pair_keys.h"
+#include "gpu/warp.cuh"
 #include "hpccd/hpccd.h"
 
 namespace hpccd::gpu {
