@@ -10,7 +10,7 @@ add_library(hpccd_core_hot OBJECT ${hot})
 set_target_properties(hpccd_core_hot PROPERTIES UNITY_BUILD OFF)  # whatever CMAKE_UNITY_BUILD of a parent project says
 add_library(hpccd_core_cold OBJECT ${cold})
 hpccd_compile_all_kernels(hpccd_core_hot)
-# The standard headers cost a source of the hot part half of its time; precompiled they change nothing in its object.
+# Precompiled, the standard headers save up to half of the time of a source; its object stays the same, byte by byte.
 target_precompile_headers(hpccd_core_hot PRIVATE <algorithm> <array> <atomic> <chrono> <cmath> <cstdint> <cstring>
   <functional> <limits> <map> <memory> <mutex> <optional> <span> <stdexcept> <string> <thread> <utility> <vector>)
 foreach(part hpccd_core_hot hpccd_core_cold)

@@ -136,8 +136,11 @@ def check(report: Report) -> None:
 
 
 def draw(rows: list[dict], path: Path) -> None:
-    """Time of each setting against its share of wrong contacts and its worst error of times; a setting without errors
-    stands at the lower border. Full marks: all contacts; hollow ones: less was asked for."""
+    """Plot the time of each setting against its share of wrong contacts and its worst error of times.
+
+    Zero has no place on a logarithmic axis: it is drawn at the value that the label of the axis names. Filled markers
+    report all contacts, hollow ones fewer.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -145,7 +148,7 @@ def draw(rows: list[dict], path: Path) -> None:
     FigureCanvasAgg(page)
     panels = (
         ("missed and spurious contacts, share", 1e-7, lambda o: o.wrong),
-        ("worst error of times (step = 1)", 1e-17, lambda o: o.values["error"]),
+        ("worst error of times, in steps", 1e-17, lambda o: o.values["error"]),
     )
     marks = {}
     for axis, (label, floor, value) in zip(page.subplots(1, 2), panels, strict=True):
@@ -157,7 +160,7 @@ def draw(rows: list[dict], path: Path) -> None:
             if setting.asked == choice.ALL:
                 marks[f"{setting.accuracy}, {setting.backend}"] = point[0]
         axis.set_xlabel("ms a step")
-        axis.set_ylabel(label)
+        axis.set_ylabel(f"{label} (0 at {floor:g})")
     page.legend(marks.values(), marks, loc="outside right center", fontsize=8)
     try:
         page.savefig(path, dpi=150)

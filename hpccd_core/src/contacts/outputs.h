@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is told of a contact besides its pair and time, and when its features are looked at for that.
+// Optional outputs of a contact, and the time at which its features are evaluated for them.
 #pragma once
 
 #include "base/vec3.h"
 
 namespace hpccd {
 
-// When the features are looked at for points and directions.
+// The time at which features are evaluated for points and directions.
 enum class AtTime : bool { contact, start };
 
 struct Outputs {

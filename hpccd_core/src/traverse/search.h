@@ -69,7 +69,7 @@ struct Search {
     pair_vertices(geometry, kind, first, second, v);
     return geometry.separations.look_up(v[0], v[2]);
   }
-  // Of a search that is worth its price only where it finds few: so many at most, and so many it found.
+  // A search that pays only where it finds few pairs gives up above most_found. Number found so far: n_found.
   std::size_t most_found = std::numeric_limits<std::size_t>::max();
   std::atomic<std::size_t> n_found = 0;
   bool bounded() const { return most_found < std::numeric_limits<std::size_t>::max(); }
