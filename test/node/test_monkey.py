@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whatever a node is asked, in whatever state and order, while frames stream: it answers, goes on and has counted all.
 
-Ten seconds, a minute with --long. HPCCD_MONKEY_CALLS=10000 sets a number of calls instead, HPCCD_MONKEY_SEED=2 the seed.
+Ten seconds, a minute with --long. HPCCD_MONKEY_CALLS=10000 sets a number of calls instead; HPCCD_MONKEY_SEED=2 a seed.
 """
 
 import math
