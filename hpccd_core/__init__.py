@@ -5,7 +5,10 @@ scene = Scene(); scene.add_mesh("cloth", faces)
 contacts = Detector(scene).detect(vertices_t0, vertices_t1)
 """
 
-from . import _find_core  # noqa: F401  (lets a source checkout use the installed extension modules)
+from . import (
+    _find_core,  # noqa: F401  (lets a source checkout use the installed extension modules)
+    shapes,
+)
 from ._core import Cancelled, DeviceArray, InvalidArgument, __version__
 from ._installations import warn_of_several as _warn_of_several
 from .contacts import Contacts
@@ -38,6 +41,7 @@ __all__ = [
     "backends",
     "gpu_status",
     "load_mesh",
+    "shapes",
     "test_edge_edge",
     "test_vertex_face",
 ]

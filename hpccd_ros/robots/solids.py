@@ -24,6 +24,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from hpccd_core import shapes
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.shapes import Box, Capsule, Cylinder, Sphere
 
@@ -43,7 +44,7 @@ def triangles(solid: Solid, tolerance: float) -> Triangles:
     Raises RobotError: a tolerance that is not above 0, or needs more than MOST_SEGMENTS a ring.
     """
     if isinstance(solid, Box):
-        return _box(solid)
+        return shapes.box(solid.size)
     if isinstance(solid, Cylinder):
         return _cylinder(solid, segments(solid, tolerance))
     return _rounded(solid, segments(solid, tolerance))
@@ -88,17 +89,6 @@ def _two_digits_up(number: float) -> float:
 def _inner(solid: Cylinder | Sphere | Capsule, count: int) -> float:
     """The radius of what a mesh of corners at the distance 1 holds."""
     return math.cos(math.pi / count) if isinstance(solid, Cylinder) else _inner_of_sphere(count // 4)
-
-
-def _box(box: Box) -> Triangles:
-    half = np.array(box.size) / 2
-    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
-    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    flat = np.flatnonzero(half == 0.0)
-    if len(flat) == 1:  # both sides coincide: a rectangle of two triangles
-        (side,) = quads[2 * flat[0] :: 6]
-        corners, quads = corners[list(side)] + 0.0, [(0, 1, 2, 3)]
-    return corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))], np.uint32)
 
 
 def _ring(count: int) -> list[tuple[float, float]]:

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from hpccd_core.shapes import grid
 from hpccd_ros.robots import arm
 from hpccd_ros.scenes import cache, cloth, dragged_cloth, gripper, shapes
 from hpccd_ros.scenes.robot import SceneRobot
@@ -35,7 +36,7 @@ def make(
         )["grids"]
 
     table, table_faces = _table()
-    _, cloth_faces = shapes.sheet(cells, cells)
+    _, cloth_faces = grid(cells, cells)
 
     def frame(index: int) -> Frame:
         part = index / (frames - 1)

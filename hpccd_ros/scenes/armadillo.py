@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hpccd_core.shapes import icosphere
 from hpccd_ros.scenes import shapes
 from hpccd_ros.scenes.exactmath import PI, axis_angle, dot, normalized, random_stream, rotate, sincos
 from hpccd_ros.scenes.scene import Frame, Mesh, Scene
@@ -57,7 +58,7 @@ def _ramp(x):
 
 def _body(frequency: int, seed: int):
     """Vertices and faces at rest, and for each limb how far a vertex belongs to it (0 to 1) and its root."""
-    directions, faces = shapes.icosphere(frequency)
+    directions, faces = icosphere(frequency)
     random = random_stream(seed)
     knobs = normalized(random.random_sample((KNOBS, 3)) - 0.5)
     height = np.zeros(len(directions))

@@ -14,6 +14,8 @@ from functools import lru_cache
 
 import numpy as np
 
+import hpccd_core.shapes
+from hpccd_core.shapes import grid, icosphere
 from hpccd_ros.scenes import cache, rigid, shapes
 from hpccd_ros.scenes.exactmath import PI, dot, length, normalized, random_stream, rotate, sincos
 from hpccd_ros.scenes.scene import Frame, Mesh, Scene, Topology
@@ -46,7 +48,7 @@ def _statue(quads: float):
 
 
 def _boulder(triangles: float):
-    vertices, faces = shapes.icosphere(max(3, round((triangles / 20) ** 0.5)))
+    vertices, faces = icosphere(max(3, round((triangles / 20) ** 0.5)))
     x, y, z = vertices[:, 0], vertices[:, 1], vertices[:, 2]
     rough = 1.0 + 0.06 * sincos(5 * x + 3 * y)[0] + 0.05 * sincos(7 * z - 4 * x)[0] + 0.02 * sincos(17 * y + 13 * z)[0]
     return vertices * (BOULDER_RADIUS * rough)[:, None], faces
@@ -156,7 +158,7 @@ def make(name: str, title: str, size: float, frames: int, seed: int, show_progre
     motion = cache.cached(
         "breaking",
         (frames, seed),
-        [rigid, shapes, sys.modules[__name__]],
+        [rigid, hpccd_core.shapes, shapes, sys.modules[__name__]],
         lambda: _simulate(frames, seed, show_progress),
     )
     cells = max(2, round(8 * size**0.5))
@@ -165,7 +167,7 @@ def make(name: str, title: str, size: float, frames: int, seed: int, show_progre
     middle = 0.5 * (outer + inner)
     piece = _nearest(middle[faces].sum(axis=1) / 3.0, motion["seeds"])
     statue = Statue(np.concatenate([outer, inner]), faces, piece)
-    ground, ground_faces = shapes.sheet(cells, cells)
+    ground, ground_faces = grid(cells, cells)
     ground = (ground * (2.5, 2.5, 0) + (0, 0, GROUND)).astype(np.float32)
     release, home = motion["release_frame"], motion["positions"][0]
 

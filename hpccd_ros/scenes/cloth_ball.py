@@ -7,7 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from hpccd_ros.scenes import cache, cloth, shapes
+from hpccd_core.shapes import grid, icosphere
+from hpccd_ros.scenes import cache, cloth
 from hpccd_ros.scenes.exactmath import axis_angle, rotate
 from hpccd_ros.scenes.scene import Frame, Mesh, Scene
 
@@ -32,9 +33,9 @@ def make(
             name, (setup, frames, seed), [cloth], lambda: {"grids": cloth.simulate(setup, frames, seed, show_progress)}
         )["grids"]
 
-    ball, ball_faces = shapes.icosphere(max(2, round((ball_triangles * size / 20) ** 0.5)))
+    ball, ball_faces = icosphere(max(2, round((ball_triangles * size / 20) ** 0.5)))
     ball = ball * setup.ball_mesh_radius
-    _, cloth_faces = shapes.sheet(cells, cells)
+    _, cloth_faces = grid(cells, cells)
     axis = np.array([0.0, 0.0, 1.0])
 
     def frame(index: int) -> Frame:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import hpccd_core.shapes
+from hpccd_core.shapes import grid, icosphere
 from hpccd_ros.scenes import cache, rigid, shapes
 from hpccd_ros.scenes.exactmath import PI, normalized, random_stream, sincos
 from hpccd_ros.scenes.scene import Frame, Mesh, Scene
@@ -41,7 +43,7 @@ def _shapes(triangles: float) -> list[Shape]:
     in_tube = max(48.0, (5 * triangles - 3 * 20 * frequency * frequency) / 2)
     corners = np.array([(x, y, z, 0.47) for x in (-0.24, 0.24) for y in (-0.24, 0.24) for z in (-0.24, 0.24)])
     egg_spheres = np.array([(0, 0, -0.5, 0.45), (0, 0, 0, 0.53), (0, 0, 0.5, 0.45)])
-    sphere, sphere_faces = shapes.icosphere(frequency)
+    sphere, sphere_faces = icosphere(frequency)
     cube, cube_faces = shapes.rounded_cube(frequency)
     along, around = _tube_grid(in_tube, 2.0)
     ring = shapes.torus(along, around)
@@ -110,10 +112,10 @@ def make(name: str, title: str, triangles: int, size: float, frames: int, seed: 
     motion = cache.cached(
         "n-body",
         (frames, seed),
-        [rigid, shapes, sys.modules[__name__]],
+        [rigid, hpccd_core.shapes, shapes, sys.modules[__name__]],
         lambda: _simulate(frames, seed, kinds, show_progress),
     )
-    ground, ground_faces = shapes.sheet(cells, cells)
+    ground, ground_faces = grid(cells, cells)
     ground *= DISH_HALF_WIDTH
     ground[:, 2] = DISH_DEPTH * (ground[:, 0] * ground[:, 0] + ground[:, 1] * ground[:, 1])
     ground = ground.astype(np.float32)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hpccd_ros.scenes import shapes
+from hpccd_core.shapes import grid
 from hpccd_ros.scenes.exactmath import PI, sincos
 from hpccd_ros.scenes.scene import Frame, Mesh, Scene
 
@@ -35,7 +35,7 @@ def folding_strip(name: str, title: str, size: float, frames: int) -> Scene:
     one another. The folds are a little sharper at one side, so that panels never come to lie in one plane.
     """
     along, across = max(12, round(90 * size**0.5)), max(2, round(18 * size**0.5))
-    flat, faces = shapes.sheet(along, across)
+    flat, faces = grid(along, across)
     # 0 to 1 over each fold, as a function of the length along the strip (in the middle of each cell).
     middle = (np.arange(along) + 0.5) * (3.0 / along)
     ramps = [np.clip((middle - fold) / 0.25 + 0.5, 0.0, 1.0) for fold in (0.95, 2.05)]

@@ -12,8 +12,9 @@ from functools import lru_cache
 import numpy as np
 from cloth_solver import motion, pairs, queries, response, setup, springs
 
+from hpccd_core import shapes
 from hpccd_ros import scenes
-from hpccd_ros.scenes import cache, shapes
+from hpccd_ros.scenes import cache
 from hpccd_ros.scenes.progress import track
 from hpccd_ros.scenes.scene import Frame, Mesh, Scene
 

@@ -9,14 +9,14 @@ import numpy as np
 import oracle
 from numpy.typing import NDArray
 
-from hpccd_ros.scenes import shapes
+from hpccd_core import shapes
 
 MESHES = ("ball", "sheet")
 FRAMES = 8  # of a trial; the last ones are far again
 DISTANCE = 0.1  # stop_distance
 _AWAY = 2.5  # of the centre of the ball, whose radius is 0.3, from the middle of the sheet, whose sides are 2
 _BALL, _BALL_FACES = shapes.icosphere(1)
-_SHEET, _SHEET_FACES = shapes.sheet(4, 4)
+_SHEET, _SHEET_FACES = shapes.grid(4, 4)
 FACES = (_BALL_FACES, _SHEET_FACES)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpccd_ros.scenes import shapes
+from hpccd_core import shapes
 from hpccd_ros.scenes.exactmath import axis_angle, random_stream, rotate
 
 # Largest small step times the frequency of a vertex on one spring.
@@ -85,7 +85,7 @@ class Setup:
 
     def cloth(self, seed: int):
         """(V,3) float64 vertices at rest above the ball, (F,3) uint32 faces."""
-        vertices, faces = shapes.sheet(self.cells, self.cells)
+        vertices, faces = shapes.grid(self.cells, self.cells)
         vertices = vertices * (0.5 * self.side)
         # Noise far below a cell breaks the symmetry that would forbid the cloth to buckle.
         noise = 0.02 * self.spacing * random_stream(seed).random_sample(len(vertices))
