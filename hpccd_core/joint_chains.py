@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The arithmetic of joint chains, for hpccd_ros.rigid.joints: where links are, and how far from straight lines they go.
+"""The arithmetic of joint chains, for hpccd_core.rigid.joints: poses of links, and how far they are off straight lines.
 
 All arrays are float64 and C-contiguous. What these hold never changes: threads may share them.
 """

@@ -14,12 +14,12 @@ from operator import is_not
 import numpy as np
 
 import hpccd_core as hc
+from hpccd_core.rigid import cuts
+from hpccd_core.rigid.merged import earliest, merged
+from hpccd_core.rigid.motion import Linear, Motion, ScrewMotion
+from hpccd_core.rigid.screw import Screw
 from hpccd_ros.detect.separation import MotionBounds, Separation
 from hpccd_ros.frames.types import SceneFrame
-from hpccd_ros.rigid import cuts
-from hpccd_ros.rigid.merged import earliest, merged
-from hpccd_ros.rigid.motion import Linear, Motion, ScrewMotion
-from hpccd_ros.rigid.screw import Screw
 from hpccd_ros.robots.placement import LinkMotions
 
 # Of detector.stats: what calls do not add up.

@@ -4,6 +4,7 @@
 import time
 from collections.abc import Collection, Sequence
 
+from hpccd_core.rigid.transform import IDENTITY
 from hpccd_ros.frames.assembler import FrameAssembler
 from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.frames.follower import Follower
@@ -24,7 +25,6 @@ from hpccd_ros.frames.types import (
     SceneFrame,
     Topology,
 )
-from hpccd_ros.rigid.transform import IDENTITY
 
 
 class FramePipeline:

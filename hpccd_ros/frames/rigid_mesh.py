@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from hpccd_core import MeshFileError
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.base.quoting import quoted, shortened
 from hpccd_ros.frames.coordinates import unusable_coordinates
 from hpccd_ros.frames.drops import Aspect, Reason, Refusal
 from hpccd_ros.frames.types import POSE, TF, UNKNOWN_TIME, MeshFrame, MeshSettings, Placement, PoseFrame, Topology
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.transform import Rigid
 
 
 class RigidMesh:

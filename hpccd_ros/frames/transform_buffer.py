@@ -8,10 +8,10 @@ says.
 
 from bisect import bisect_left
 
+from hpccd_core.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.base.quoting import listed, quoted
 from hpccd_ros.frames.samples import Run, Samples
 from hpccd_ros.frames.types import ALWAYS, OUTDATED, UNKNOWN_TIME
-from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
 MOST_FRAMES = 1000  # about 500 MB if every frame were full
 LONGEST_NAME = 255

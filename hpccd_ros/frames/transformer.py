@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hpccd_core.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames.coordinates import unusable_coordinates
 from hpccd_ros.frames.drops import Aspect, Reason, Refusal
 from hpccd_ros.frames.standstill import Standstill
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.frames.types import ALWAYS, TF, MeshFrame, MeshSettings
-from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
 
 class Transformed(NamedTuple):

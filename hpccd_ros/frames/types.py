@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.frames.drops import Aspect, Reason, Refusal
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.transform import Rigid
 
 # Values of parameter mesh.NAME.input for meshes that move by poses; JOINTS: by the joints of their robot.
 POSE, TF, JOINTS = "pose", "tf", "joints"

@@ -9,12 +9,12 @@ from geometry_msgs.msg import PoseStamped
 from hpccd.msg import MeshTopology, MeshVertices
 from sensor_msgs.msg import PointCloud2, PointField
 
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.base.quoting import listed
 from hpccd_ros.frames.coordinates import unusable_coordinates
 from hpccd_ros.frames.drops import Reason
 from hpccd_ros.frames.types import NO_EDGES, Topology
 from hpccd_ros.middleware.fields import InvalidMessageError, ns_to_stamp, stamp_to_ns, to_field
-from hpccd_ros.rigid.transform import Rigid
 
 _FIELD_TYPES = {PointField.FLOAT32: np.dtype(np.float32), PointField.FLOAT64: np.dtype(np.float64)}
 

@@ -8,6 +8,7 @@ understood as well.
 import dataclasses
 from typing import Any
 
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
 from hpccd_ros.frames.samples import stray_text
@@ -15,7 +16,6 @@ from hpccd_ros.frames.transform_buffer import TransformBuffer
 from hpccd_ros.frames.types import UNKNOWN_TIME
 from hpccd_ros.middleware import fields, topic_names
 from hpccd_ros.middleware.message_types import message_class
-from hpccd_ros.rigid.transform import Rigid
 
 STAMPED = "geometry_msgs/msg/TransformStamped"
 TF2 = "tf2_msgs/msg/TFMessage"

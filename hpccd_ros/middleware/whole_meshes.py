@@ -12,12 +12,12 @@ from builtin_interfaces.msg import Time
 from numpy.typing import NDArray
 from visualization_msgs.msg import Marker
 
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.frames.drops import Reason
 from hpccd_ros.frames.types import Topology
 from hpccd_ros.frames.welding import Welding
 from hpccd_ros.middleware.fields import InvalidMessageError, stamp_to_ns
 from hpccd_ros.middleware.mesh_messages import check_size, usable
-from hpccd_ros.rigid.transform import Rigid
 
 # Behind these bytes, which tell the encoding, the message begins, and alignment counts.
 _HEADER = 4

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.base.quoting import shortened
 from hpccd_ros.frames.types import JOINTS, MeshSettings
 from hpccd_ros.params.table import ROBOT
 from hpccd_ros.params.values import ParameterError, robot_rows
-from hpccd_ros.rigid.transform import Rigid
 from hpccd_ros.robots.joint_frames import JointFrames
 from hpccd_ros.robots.robot import Robot
 

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from hpccd_core.options import FEATURES, OUTPUTS
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.base.quoting import quoted, shortened
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.rigid_step import RigidOptions
@@ -18,7 +19,6 @@ from hpccd_ros.params import pair_parameters, robot_parameters
 from hpccd_ros.params.robot_parameters import NO_ROBOTS, Robots
 from hpccd_ros.params.table import ROBOT
 from hpccd_ros.params.values import ParameterError
-from hpccd_ros.rigid.transform import Rigid
 
 MeshValues = dict[str, dict[str, Any]]
 

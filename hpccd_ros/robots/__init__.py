@@ -8,6 +8,6 @@ In the order of use (an example is in test/robots/test_robot.py):
     robot.ignored_pairs                                 # names of meshes: neighbours, and what the SRDF disables
     start = robot.kinematics.state(positions, base)     # positions: {name of a joint: value}
     end = robot.kinematics.state(positions_later, base)
-    motions = robot.motions(start, end)                 # one for each mesh, for hpccd_ros.rigid
+    motions = robot.motions(start, end)                 # one for each mesh, for hpccd_core.rigid
     robot.placements(end)                               # the same for frames of the scene: detect makes the motions
 """

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from hpccd_ros.rigid.transform import IDENTITY, Rigid, product, rotated
+from hpccd_core.rigid.transform import IDENTITY, Rigid, product, rotated
 
 NAME = "arm"
 JOINTS = tuple(f"joint_{k}" for k in range(1, 8))

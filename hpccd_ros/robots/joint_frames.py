@@ -9,12 +9,12 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.frames.drops import Aspect, Reason, Refusal
 from hpccd_ros.frames.follower import Followed
 from hpccd_ros.frames.standstill import Standstill
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.frames.types import MeshFrame
-from hpccd_ros.rigid.transform import Rigid
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.joint_history import JointHistory, NoJointStateError
 from hpccd_ros.robots.robot import Robot

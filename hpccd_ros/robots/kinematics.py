@@ -17,13 +17,13 @@ from functools import cached_property
 
 import numpy as np
 
+from hpccd_core.rigid import rounding
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.joints import Chain, Joint, JointStep, LinkMotion, as_rigid
+from hpccd_core.rigid.rounding import dot
+from hpccd_core.rigid.screw import Screw
+from hpccd_core.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.base.quoting import listed
-from hpccd_ros.rigid import rounding
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.joints import Chain, Joint, JointStep, LinkMotion, as_rigid
-from hpccd_ros.rigid.rounding import dot
-from hpccd_ros.rigid.screw import Screw
-from hpccd_ros.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.urdf import Description, RobotJoint
 

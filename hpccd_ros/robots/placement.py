@@ -7,10 +7,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.joints import LinkMotion
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.frames.types import Placement
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.joints import LinkMotion
-from hpccd_ros.rigid.transform import Rigid
 from hpccd_ros.robots.kinematics import RobotState, RobotStep
 
 

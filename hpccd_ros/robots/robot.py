@@ -10,11 +10,11 @@ from itertools import chain
 import numpy as np
 
 from hpccd_core.joint_chains import placed
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.joints import LinkMotion
 from hpccd_ros.base.quoting import listed, quoted
 from hpccd_ros.frames.coordinates import LARGEST_OF_POSES, unusable_coordinates
 from hpccd_ros.frames.types import JOINTS, TF, MeshSettings, Topology
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.joints import LinkMotion
 from hpccd_ros.robots import srdf, urdf
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.geometry import LinkMeshes, Resolver, no_files

@@ -3,7 +3,7 @@
 
 from dataclasses import dataclass
 
-from hpccd_ros.rigid.transform import Rigid
+from hpccd_core.rigid.transform import Rigid
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hpccd_core.rigid.joints import TURNING, Joint
+from hpccd_core.rigid.transform import IDENTITY, Rigid, product
 from hpccd_ros.base.quoting import listed, quoted
-from hpccd_ros.rigid.joints import TURNING, Joint
-from hpccd_ros.rigid.transform import IDENTITY, Rigid, product
 from hpccd_ros.robots import xml_tree
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.shapes import Box, Capsule, Cylinder, MeshFile, Placed, Sphere

@@ -13,14 +13,14 @@ import numpy as np
 
 import hpccd_core as hc
 from bench.lab import times
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.cuts import Margin, all_grown, bound, fewest_parts
+from hpccd_core.rigid.joints import Joint, JointStep, LinkMotion
+from hpccd_core.rigid.merged import merged
+from hpccd_core.rigid.motion import Linear, Motion, ScrewMotion
+from hpccd_core.rigid.screw import Screw
+from hpccd_core.rigid.transform import IDENTITY, Rigid
 from hpccd_ros import scenes as generated
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.cuts import Margin, all_grown, bound, fewest_parts
-from hpccd_ros.rigid.joints import Joint, JointStep, LinkMotion
-from hpccd_ros.rigid.merged import merged
-from hpccd_ros.rigid.motion import Linear, Motion, ScrewMotion
-from hpccd_ros.rigid.screw import Screw
-from hpccd_ros.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.scenes.scene import Mesh
 
 _SCENE = "cloth-ball-like"

@@ -9,15 +9,15 @@ import pytest
 from waving_sheet import sheet_faces, sheet_positions
 
 import hpccd_core as hc
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.screw import Screw
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.rigid_step import RigidOptions
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.separation import Separation
 from hpccd_ros.detect.step_detector import StepDetector
 from hpccd_ros.frames.types import MeshSettings, Placement, SceneFrame, Topology
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.screw import Screw
-from hpccd_ros.rigid.transform import Rigid
 
 N = 10
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * [0.3, 0.06, 0.02]

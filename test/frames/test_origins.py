@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from pipelines import retried
 
+from hpccd_core.rigid.transform import IDENTITY
 from hpccd_ros.frames import transform_buffer
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.types import (
@@ -18,7 +19,6 @@ from hpccd_ros.frames.types import (
     PoseFrame,
     Topology,
 )
-from hpccd_ros.rigid.transform import IDENTITY
 
 FACES = np.array([[0, 1, 2]], np.uint32)
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from pipelines import reasons, retried
 
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.frames.drops import Input, Reason
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.types import AssemblyRules, MeshFrame, MeshSettings, Topology
-from hpccd_ros.rigid.transform import Rigid
 
 FACES = np.array([[0, 1, 2]], np.uint32)
 CLOTH, BALL, FLOOR = MeshSettings("cloth"), MeshSettings("ball"), MeshSettings("floor", static=True)

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from pipelines import reasons, retried
 
+from hpccd_core.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.separation import Separation
 from hpccd_ros.detect.step_detector import StepDetector
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.types import AssemblyRules, MeshFrame, MeshSettings, Outcome, PoseFrame, Topology
-from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
 FACES = np.array([[0, 1, 2]], np.uint32)
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)

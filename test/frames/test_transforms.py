@@ -7,6 +7,7 @@ from geometry_msgs.msg import TransformStamped
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hpccd_core.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.frames import samples, transform_buffer
 from hpccd_ros.frames.arrivals import RateLimit
 from hpccd_ros.frames.drops import Input, Reason
@@ -14,7 +15,6 @@ from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.frames.transformer import MeshTransformer
 from hpccd_ros.frames.types import MeshFrame, MeshSettings
 from hpccd_ros.middleware import topic_names, transform_topics
-from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]])
 SECOND = 10**9

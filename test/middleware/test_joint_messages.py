@@ -5,8 +5,8 @@ import crane
 import pytest
 from sensor_msgs.msg import JointState
 
+from hpccd_core.rigid.transform import IDENTITY
 from hpccd_ros.middleware import joint_messages
-from hpccd_ros.rigid.transform import IDENTITY
 from hpccd_ros.robots.joint_frames import JointFrames
 
 

@@ -12,11 +12,11 @@ from shape_msgs.msg import Mesh, MeshTriangle
 from visualization_msgs.msg import Marker
 from whole_meshes import marker_of, shape_of
 
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.frames.drops import Reason
 from hpccd_ros.frames.welding import Welding
 from hpccd_ros.middleware import mesh_inputs
 from hpccd_ros.middleware.fields import InvalidMessageError
-from hpccd_ros.rigid.transform import Rigid
 
 VERTICES = np.array([[0.1, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.5]])
 FACES = np.array([[0, 1, 2], [3, 2, 1]], np.uint32)

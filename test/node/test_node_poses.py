@@ -10,6 +10,8 @@ from geometry_msgs.msg import PoseStamped, TransformStamped
 from node_calls import set_parameter
 from waving_sheet import sheet_faces, sheet_positions
 
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros import client
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.layout import Layout
@@ -20,8 +22,6 @@ from hpccd_ros.frames.types import MeshSettings, Placement, SceneFrame, Topology
 from hpccd_ros.middleware import contact_messages, fields, qos
 from hpccd_ros.params import scene_parameters, values
 from hpccd_ros.params.values import ParameterError
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.transform import Rigid
 
 N = 8
 SHEET = Topology(0, N * N, sheet_faces(N))

@@ -19,6 +19,7 @@ from sources import SUPPORT
 from std_msgs.msg import String
 from waving_sheet import sheet_faces, sheet_positions
 
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros import client
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.detect.core import Options
@@ -30,7 +31,6 @@ from hpccd_ros.frames.types import MeshSettings, Placement, SceneFrame, Topology
 from hpccd_ros.middleware import contact_messages, fields, qos
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
-from hpccd_ros.rigid.transform import Rigid
 
 N = 8
 SHEET = Topology(0, N * N, sheet_faces(N))

@@ -10,8 +10,8 @@ from node_calls import change_state, set_parameter
 from node_process import assert_same_contacts
 from waving_sheet import scene_of
 
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.middleware import qos
-from hpccd_ros.rigid.transform import Rigid
 
 
 def send(node, k, frame_id):

@@ -13,13 +13,13 @@ from waving_sheet import scene_of, sheet_positions
 from whole_meshes import marker_of, shape_of
 
 from hpccd_core.mesh_files.welding import weld
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.bag.writer import BagWriter
 from hpccd_ros.middleware import fields, mesh_messages, qos
 from hpccd_ros.record import recorded_topics
 from hpccd_ros.record.recorded_topics import recording_info
 from hpccd_ros.record.topic_recorder import Recorder
-from hpccd_ros.rigid.transform import Rigid
 
 # As the node numbers the corners of a marker: vertices in the order of their first use.
 FIRST, VERTEX_OF = weld(sheet_positions(N, 0, dtype=np.float64)[FACES.reshape(-1)])

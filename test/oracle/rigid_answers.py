@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the detector says about random queries by way of hpccd_ros.rigid, beside the truth."""
+"""What the detector says about random queries by way of hpccd_core.rigid, beside the truth."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import hpccd_core as hc
-from hpccd_ros.rigid.cuts import Margin, bound, fewest_parts, grown
+from hpccd_core.rigid.cuts import Margin, bound, fewest_parts, grown
 from oracle.rigid_queries import Queries
 from oracle.rigid_truth import BEYOND, OPEN, WITHIN, comes_within
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Points that go with a rigid mesh or with a link, as mathematics has it: many queries at once, in any precision.
 
-It shares no formula with hpccd_ros.rigid. A screw is the exponential of its twist here; a link goes by products of
+It shares no formula with hpccd_core.rigid. A screw is the exponential of its twist here; a link goes by products of
 matrices. `kind` is np.float64, or np.longdouble for what that leaves open.
 """
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.joints import Joint, JointStep, LinkMotion
-from hpccd_ros.rigid.motion import Motion, ScrewMotion
-from hpccd_ros.rigid.screw import Screw
-from hpccd_ros.rigid.transform import Rigid
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.joints import Joint, JointStep, LinkMotion
+from hpccd_core.rigid.motion import Motion, ScrewMotion
+from hpccd_core.rigid.screw import Screw
+from hpccd_core.rigid.transform import Rigid
 from oracle.rigid_paths import LinkPaths, Paths, ScrewPaths
 from oracle.rigid_truth import Pairs
 
@@ -30,7 +30,7 @@ class Queries:
     tolerance: np.ndarray
 
     def motions(self, k: int) -> tuple[Motion, Motion]:
-        """Of both sides of query k, as hpccd_ros.rigid has them."""
+        """Of both sides of query k, as hpccd_core.rigid has them."""
         return random_motion(self.pairs.a, k), random_motion(self.pairs.b, k)
 
 
@@ -144,7 +144,7 @@ def _nearest_time(pairs):
 
 
 def random_motion(paths: Paths, k: int) -> Motion:
-    """Of query k, as hpccd_ros.rigid has it."""
+    """Of query k, as hpccd_core.rigid has it."""
     body = Body.of(paths.points[k])
     if isinstance(paths, ScrewPaths):
         start, end = (Rigid(q, shift) for q, shift in zip(paths.quaternions[k], paths.shifts[k], strict=True))

@@ -12,6 +12,7 @@ from mesh_in_a_hand import FACES, SCENE, SECOND, N, topologies, transform
 from node_process import PATIENCE, assert_same_contacts
 from waving_sheet import scene_of, sheet_positions
 
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.frames.transform_buffer import TransformBuffer
@@ -20,7 +21,6 @@ from hpccd_ros.record import recorded_topics
 from hpccd_ros.record.recorded_topics import recording_info
 from hpccd_ros.record.topic_recorder import Recorder
 from hpccd_ros.replay import recorded_setup
-from hpccd_ros.rigid.transform import Rigid
 
 STEPS = 12
 NET = {"transform": "tf", "frame": "hand"}

@@ -24,13 +24,13 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from waving_sheet import sheet_faces, sheet_positions
 
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.bag.cut import Time, cut, seconds
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.middleware import answer_fields, contact_messages, fields, mesh_messages
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
-from hpccd_ros.rigid.transform import Rigid
 
 N = 6
 SECOND = 10**9

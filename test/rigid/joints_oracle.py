@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Joints and the bounds of their links as hpccd_ros/rigid/joints.py derives them, in plain Python: what the core gives
+"""Joints and the bounds of their links as hpccd_core/rigid/joints.py derives them, in plain Python: what the core gives
 is compared with it to the last bit."""
 
 import math
@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from hpccd_ros.rigid import rounding
-from hpccd_ros.rigid.rounding import in_order
-from hpccd_ros.rigid.transform import IDENTITY, Rigid, rotated
+from hpccd_core.rigid import rounding
+from hpccd_core.rigid.rounding import in_order
+from hpccd_core.rigid.transform import IDENTITY, Rigid, rotated
 
 
 def moved(joint, value):

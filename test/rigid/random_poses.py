@@ -4,8 +4,8 @@
 import numpy as np
 from oracle.rigid_paths import ScrewPaths
 
-from hpccd_ros.rigid.screw import Screw
-from hpccd_ros.rigid.transform import Rigid
+from hpccd_core.rigid.screw import Screw
+from hpccd_core.rigid.transform import Rigid
 
 
 def quaternion(axis, angle):

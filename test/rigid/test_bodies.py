@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whole meshes, the way that hpccd_ros/rigid/__init__.py shows: a turning body, a link and a deforming sheet."""
+"""Whole meshes, the way that hpccd_core/rigid/__init__.py shows: a turning body, a link and a deforming sheet."""
 
 from itertools import pairwise
 
@@ -8,12 +8,12 @@ import pytest
 from random_poses import random_screw
 
 import hpccd_core as hc
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.cuts import Margin, bound, fewest_parts, grown
-from hpccd_ros.rigid.joints import Joint, JointStep, LinkMotion
-from hpccd_ros.rigid.merged import merged
-from hpccd_ros.rigid.motion import Linear, ScrewMotion
-from hpccd_ros.rigid.transform import IDENTITY, Rigid
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.cuts import Margin, bound, fewest_parts, grown
+from hpccd_core.rigid.joints import Joint, JointStep, LinkMotion
+from hpccd_core.rigid.merged import merged
+from hpccd_core.rigid.motion import Linear, ScrewMotion
+from hpccd_core.rigid.transform import IDENTITY, Rigid
 
 BOX = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 BOX_FACES = np.array(

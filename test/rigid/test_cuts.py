@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from random_poses import random_screw
 
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.cuts import Margin, all_grown, bound, fewest_parts, grown
-from hpccd_ros.rigid.motion import Linear, ScrewMotion
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.cuts import Margin, all_grown, bound, fewest_parts, grown
+from hpccd_core.rigid.motion import Linear, ScrewMotion
 
 POINTS = np.random.default_rng(1).standard_normal((20, 3))
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from oracle.rigid_queries import random_motion, random_paths
 
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.cuts import fewest_parts
-from hpccd_ros.rigid.joints import Joint, JointStep, LinkMotion
-from hpccd_ros.rigid.transform import IDENTITY, Rigid
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.cuts import fewest_parts
+from hpccd_core.rigid.joints import Joint, JointStep, LinkMotion
+from hpccd_core.rigid.transform import IDENTITY, Rigid
 
 Z = (0.0, 0.0, 1.0)
 POINTS = np.array([[0.1, 0.0, 0.0], [0.0, 0.1, 0.1], [-0.1, 0.0, 0.05]])

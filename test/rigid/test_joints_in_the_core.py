@@ -9,9 +9,9 @@ import pytest
 
 from hpccd_core import InvalidArgument
 from hpccd_core.joint_chains import JointBounds, JointChain, JointKind, placed
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.joints import KINDS, Chain, Joint, JointStep, LinkMotion
-from hpccd_ros.rigid.transform import IDENTITY, Rigid
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.joints import KINDS, Chain, Joint, JointStep, LinkMotion
+from hpccd_core.rigid.transform import IDENTITY, Rigid
 
 TREES = ("chain", "star", "tree")
 SIZES = (1.0, 1e-160, 1e-9, 1e6, 1e140)

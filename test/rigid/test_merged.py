@@ -9,7 +9,7 @@ import pytest
 
 import hpccd_core as hc
 from hpccd_core.parts import hash_of
-from hpccd_ros.rigid.merged import merged
+from hpccd_core.rigid.merged import merged
 
 OUTPUTS = ("points", "normals", "closest")
 

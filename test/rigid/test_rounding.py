@@ -8,8 +8,8 @@ import pytest
 from oracle.rigid_queries import random_motion, random_paths
 from random_poses import random_screw, true_vertices
 
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.motion import Linear, ScrewMotion
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.motion import Linear, ScrewMotion
 
 LONG = np.longdouble
 pytestmark = pytest.mark.skipif(np.finfo(LONG).eps > 1e-18, reason="no floats of 64 bits to compare with")

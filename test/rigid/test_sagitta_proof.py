@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The two claims of hpccd_ros/rigid/screw.py about arc and chord, in rational intervals and in 40 digits."""
+"""The two claims of hpccd_core/rigid/screw.py about arc and chord, in rational intervals and in 40 digits."""
 
 from decimal import Decimal, localcontext
 from fractions import Fraction

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from random_poses import quaternion, random_screw, true_vertices
 
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.screw import Screw
-from hpccd_ros.rigid.transform import IDENTITY, Rigid
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.screw import Screw
+from hpccd_core.rigid.transform import IDENTITY, Rigid
 
 ANGLES = (0.0, 1e-300, 1e-15, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 2.0, 3.0, math.pi - 1e-9)
 

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from hpccd_ros.rigid.rounding import dot, in_order
+from hpccd_core.rigid.rounding import dot, in_order
 
 
 def test_each_step_is_rounded():

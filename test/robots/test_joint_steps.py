@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hpccd_core.rigid.joints import LinkMotion
+from hpccd_core.rigid.motion import ScrewMotion
+from hpccd_core.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.rigid_step import RigidOptions, motions
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.step_detector import StepDetector
 from hpccd_ros.frames.types import MeshSettings, Placement, SceneFrame, Topology
-from hpccd_ros.rigid.joints import LinkMotion
-from hpccd_ros.rigid.motion import ScrewMotion
-from hpccd_ros.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.robots.robot import Robot
 
 # Two joints that turn against each other: the plate at the end keeps its direction, and goes on an arc of radius 1.

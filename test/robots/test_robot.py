@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import hpccd_core as hc
+from hpccd_core.rigid.cuts import Margin, fewest_parts, grown
+from hpccd_core.rigid.motion import Linear
+from hpccd_core.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.frames.types import TF
-from hpccd_ros.rigid.cuts import Margin, fewest_parts, grown
-from hpccd_ros.rigid.motion import Linear
-from hpccd_ros.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.robot import Robot
 

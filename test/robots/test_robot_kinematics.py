@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from random_urdf import matrices, random_urdf, turn
 
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.transform import IDENTITY, Rigid
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.robots import urdf
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.kinematics import Kinematics

@@ -5,8 +5,8 @@ import numpy as np
 from geometry_msgs.msg import TransformStamped
 from waving_sheet import sheet_faces, sheet_positions
 
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.middleware import fields
-from hpccd_ros.rigid.transform import Rigid
 
 N = 12
 FACES = sheet_faces(N)

@@ -17,9 +17,9 @@ from rosbags.serde import SerdeError
 
 import hpccd_core as hc
 from hpccd_core import load_mesh
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.frames.rigid_mesh import place
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
-from hpccd_ros.rigid.transform import Rigid
 
 NOT_THERE = "its positions are not there"
 FIELDS = ("kind", "mesh_a", "mesh_b", "features_a", "features_b", "toc")

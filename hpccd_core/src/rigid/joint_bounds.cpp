@@ -15,7 +15,7 @@ namespace hpccd::rigid {
 
 namespace {
 
-// Bounds of rounding: those of hpccd_ros/rigid/rounding.py, which derives them, to the last bit.
+// Bounds of rounding: those of hpccd_core/rigid/rounding.py, which derives them, to the last bit.
 
 constexpr double unit = 0x1p-53;
 constexpr double tiny = 1e-150;  // lengths below it come from squares that underflow

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How links move while joints go at constant speed from values to values. hpccd_ros/rigid/joints.py derives the bounds.
+// How links move while joints go at constant speed from values to values; hpccd_core/rigid/joints.py: the bounds.
 #pragma once
 
 #include <cstddef>

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from hpccd_ros.rigid.rounding import dot
+from hpccd_core.rigid.rounding import dot
 
 # Quaternions come rounded, often to float32 or to a few digits: within this they are taken as of unit length.
 _LENGTH_TOLERANCE = 1e-3

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpccd_ros.rigid import rounding
+from hpccd_core.rigid import rounding
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,10 +53,10 @@ from types import MappingProxyType
 import numpy as np
 
 from hpccd_core.joint_chains import JointBounds, JointChain, JointKind, placed
-from hpccd_ros.rigid import rounding
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.rounding import dot
-from hpccd_ros.rigid.transform import IDENTITY, Rigid
+from hpccd_core.rigid import rounding
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.rounding import dot
+from hpccd_core.rigid.transform import IDENTITY, Rigid
 
 TURNING = ("revolute", "continuous")
 KINDS = (*TURNING, "prismatic", "fixed")

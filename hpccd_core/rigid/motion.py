@@ -7,9 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
-from hpccd_ros.rigid import rounding
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.screw import Screw
+from hpccd_core.rigid import rounding
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.screw import Screw
 
 
 class Motion(Protocol):

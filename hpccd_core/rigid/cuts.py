@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hpccd_ros.rigid import rounding
-from hpccd_ros.rigid.motion import Motion
+from hpccd_core.rigid import rounding
+from hpccd_core.rigid.motion import Motion
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,7 @@ given (float32 becomes float64 without rounding).
 """
 
 from collections.abc import Iterable
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +60,10 @@ _UP = 1.0 + 2.0**-48  # more than what the sums and products of a bound itself m
 TINY = 1e-150  # lengths below it come from squares that underflow
 
 
-def up(bound: float) -> float:
+Number = TypeVar("Number", float, NDArray[np.float64])
+
+
+def up(bound: Number) -> Number:
     """Not below the number that a few operations on floats meant; 0 stays 0."""
     return bound * _UP
 

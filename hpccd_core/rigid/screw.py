@@ -45,10 +45,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpccd_ros.rigid import rounding
-from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.rounding import dot
-from hpccd_ros.rigid.transform import Rigid, product, rotated
+from hpccd_core.rigid import rounding
+from hpccd_core.rigid.body import Body
+from hpccd_core.rigid.rounding import dot
+from hpccd_core.rigid.transform import Rigid, product, rotated
 
 # Turns below it move no coordinate that a double can hold, and the square of their sine would underflow.
 _NO_TURN = 1e-140
@@ -144,7 +144,8 @@ class Screw:
         """Without their parts along the axis: (3,k)."""
         w = self.axis
         along = w[0] * columns[0] + w[1] * columns[1] + w[2] * columns[2]
-        return columns - w[:, None] * along
+        across: np.ndarray = columns - w[:, None] * along
+        return across
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
