@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot beside a cloth over DDS: the scene arm-and-cloth streamed at a rate, the arm as its joint states; how many
 steps are answered, and how long after the frame was sent: in all, in the detection, in its core, and beside the core.
-The table, which stands still, is sent once, as node.md asks for.
+The table, which stands still, is sent once, as docs/meshes.md describes.
 
   python -m bench robot                         1,501 frames at 250 a second: 6 s of motion
   python -m bench robot --rate 500 --threads 1

@@ -30,5 +30,5 @@ goal = Detect.Goal(mesh_names=["hand", "table"], topologies=[triangle, triangle]
 goal.start = [client.vertices_message(x, stamp_ns=0) for x in (hand, table)]
 goal.end = [client.vertices_message(x, stamp_ns=1) for x in (hand - [0, 0, 2], table)]
 handle = done(action.send_goal_async(goal, feedback_callback=on_feedback))
-ended = done(handle.get_result_async())  # to give up instead: done(handle.cancel_goal_async())
+ended = done(handle.get_result_async())  # to cancel instead: done(handle.cancel_goal_async())
 print(ended.result.success, ended.result.message)

@@ -15,7 +15,7 @@ table = np.array([[-5.0, -5, 0], [5, -5, 0], [0, 5, 0]])
 
 
 def free_step(start, end):
-    """How much of the way from start to end the hand may go, 0 .. 1."""
+    """The collision-free part of the motion from start to end, 0 .. 1."""
     positions = [{"hand": hand, "table": table} for hand in (start, end)]
     request = client.collision_free_step_request(*positions, topologies={"hand": triangle, "table": triangle})
     future = service.call_async(request)
@@ -24,13 +24,13 @@ def free_step(start, end):
 
 
 def energy(hand):
-    """Of springs that pull each corner to a height of -0.5, below the table."""
+    """Energy of springs that pull each corner to a height of -0.5, below the table."""
     return ((hand[:, 2] + 0.5) ** 2).sum()
 
 
 hand = np.array([[0, 0, 0.2], [1, 0, 0.5], [0, 1, 0.5]])
 direction = np.array([0, 0, -0.8])
-step = 0.9 * free_step(hand, hand + direction)  # not quite to where it touches
-while energy(hand + step * direction) > energy(hand):  # a shorter step is free too: no need to ask again
+step = 0.9 * free_step(hand, hand + direction)  # stop before the contact
+while energy(hand + step * direction) > energy(hand):  # a shorter step is collision-free too
     step /= 2
-print(f"{step:.6f}")  # 0.225000: the table is in the way at a quarter
+print(f"{step:.6f}")

@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-# A mesh as a marker of loose triangles, as in docs/node.md.
 import time
 
 import numpy as np
@@ -15,15 +14,15 @@ node = rclpy.create_node("drawing")
 publisher = node.create_publisher(Marker, client.marker_topic("cloth"), client.VERTICES_QOS)
 while not publisher.get_subscription_count():
     time.sleep(0.05)
-corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)  # of two triangles
+corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)  # two triangles
 marker = Marker(type=Marker.TRIANGLE_LIST)
 marker.header.frame_id = "world"
 marker.scale.x = marker.scale.y = marker.scale.z = 1.0
 for step in range(100):
-    corners[4, :2] = 1 - 0.01 * step  # the corner that only the second has goes through the edge that they share
+    corners[4, :2] = 1 - 0.01 * step  # this corner of the second triangle crosses the shared edge
     marker.points = [Point(x=x, y=y, z=z) for x, y, z in corners.tolist()]
     marker.header.stamp = node.get_clock().now().to_msg()
     publisher.publish(marker)
     time.sleep(0.05)
 topology, vertices = client.mesh_from_marker(marker)
-print(topology.n_vertices, topology.faces.tolist())  # 4 [[0, 1, 2], [1, 3, 2]]
+print(topology.n_vertices, topology.faces.tolist())

@@ -14,7 +14,7 @@ triangle = client.topology_message(np.array([[0, 1, 2]]), n_vertices=3)
 hand = np.array([[0, 0, 0.2], [1, 0, 1], [0, 1, 1]])
 table = np.array([[-5.0, -5, 0], [5, -5, 0], [0, 5, 0]])
 request = Detect.Request(
-    mesh_names=["hand", "table"],  # of meshes of the node: without topologies
+    mesh_names=["hand", "table"],
     topologies=[triangle, triangle],
     end=[client.vertices_message(x, stamp_ns=0) for x in (hand, table)],
     query="proximity",
@@ -23,6 +23,6 @@ request = Detect.Request(
 future = service.call_async(request)
 rclpy.spin_until_future_complete(node, future)
 answer = future.result()
-print(answer.success, answer.message)  # True 1 pairs within 0.3
+print(answer.success, answer.message)
 near = client.contacts_from_message(answer.contacts)
-print(near.distance, near.features_a, near.features_b)  # vertex 0 of the hand is 0.2 from face 0 of the table
+print(near.distance, near.features_a, near.features_b)  # vertex 0 of the hand, face 0 of the table
