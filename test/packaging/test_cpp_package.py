@@ -224,6 +224,21 @@ def test_errors_are_caught_across_the_library(prefix, tmp_path):
     run(tmp_path / "build" / "user")
 
 
+def test_the_program_of_the_page(prefix, tmp_path):
+    """docs/cpp.md: its program, linked by its lines of CMake, prints the output that the page shows."""
+    page = (ROOT / "docs" / "cpp.md").read_text()
+    program, output = re.search(r"```cpp\n(.*?)```\n\n```text\n(.*?)```", page, re.DOTALL).groups()
+    link = re.search(r"```cmake\n(.*?)```", page, re.DOTALL)[1]
+    find, target = link.split("target_link_libraries")
+    source = project(
+        tmp_path / "simulator", f"{find}add_executable(simulator simulator.cpp)\ntarget_link_libraries{target}"
+    )
+    (source / "simulator.cpp").write_text(program)
+    configure(source, tmp_path / "build", prefix, "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Wpedantic -Werror")
+    run("cmake", "--build", tmp_path / "build")
+    assert run(tmp_path / "build" / "simulator") == output
+
+
 @pytest.mark.parametrize("header", sorted(f.name for f in (ROOT / "hpccd_core" / "include" / "hpccd").glob("*.h")))
 def test_each_header_stands_alone(header, prefix, tmp_path):
     source = tmp_path / "alone.cpp"
