@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from catkin_pkg.changelog import BulletList, Changelog, populate_changelog_from_rst
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -91,3 +92,18 @@ def test_each_source_file_names_its_licence():
             if file.suffix in suffixes and SPDX not in file.read_text()[:300]:
                 missing.append(str(file.relative_to(ROOT)))
     assert missing == []
+
+
+def test_packaging_tools_of_ros_read_the_changelog():
+    """REP-132: they skip sections within a version, so its groups are paragraphs."""
+    text = (ROOT / "CHANGELOG.rst").read_text()
+    changelog = Changelog("hpccd")
+    populate_changelog_from_rst(changelog, text.replace("(forthcoming)", "(2030-01-31)"))
+    versions = list(changelog.foreach_version())
+    assert versions[0][0] == PYPROJECT["project"]["version"]
+    for version, _, contents in versions:
+        groups = [str(part) for part in contents if str(part).startswith("**")]
+        assert groups == [f"**{name}**" for name in ("Added", "Changed", "Fixed") if f"**{name}**" in groups], version
+        entries = sum(len(list(part)) for part in contents if isinstance(part, BulletList))
+        section = re.search(rf"^{re.escape(version)} \(.*?(?=^\d+\.\d+\.\d+ \(|\Z)", text, re.DOTALL | re.MULTILINE)[0]
+        assert entries == len(re.findall(r"^ *\* ", section, re.MULTILINE)) > 0, version
