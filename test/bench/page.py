@@ -169,20 +169,23 @@ TABLES = {
         ("memory-2-cores",),
         SIZE
         | _mib(detector="detector_bytes")
-        | _whole(bytes_a_triangle="detector_bytes_per_triangle")
+        | _whole(bytes_per_triangle="detector_bytes_per_triangle")
         | _mib(process="process_bytes"),
     ),
     "ropes": Table(
         ("ropes-2-cores",),
-        {"as": "way"} | _same("edges", "triangles", "contacts") | {"ms a step": "ms"} | _mib(detector="bytes"),
+        {"represented as": "way"}
+        | _same("edges", "triangles", "contacts")
+        | {"ms per step": "ms"}
+        | _mib(detector="bytes"),
     ),
     "worlds-on-cpus": Table(
         ("worlds-2-cores", "worlds-16-cores"),
         _same("scene", "triangles", "threads", "worlds")
         | {"one call, ms": "one_call_ms"}
-        | _to(2, of_all_threads="of_all_threads")
-        | {"one detector": "one_detector_ms", "a detector each": "detectors_ms"}
-        | _whole(bytes_a_world="bytes_a_world"),
+        | _to(2, thread_efficiency="of_all_threads")
+        | {"one detector, ms": "one_detector_ms", "one per world, ms": "detectors_ms"}
+        | _whole(bytes_per_world="bytes_a_world"),
     ),
     "distances": Table(
         ("distance-2-cores",),
@@ -199,7 +202,7 @@ TABLES = {
         {"scene": "scene", "contacts": lab.whole("contacts")}
         | {"earliest at": lambda row: f"{row['earliest']:.4g}", "all, ms": "step_ms"}
         | {head: cell(query, shown=over("step_ms", "over_base")) for query, head in OVER_ALL.items()}
-        | {"step x ipctk": cell("step", shown=lambda row: f"{row['times_faster_than_ipctk']:,.0f}")},
+        | {"ratio to ipctk": cell("step", shown=lambda row: f"{row['times_faster_than_ipctk']:,.0f}")},
         by("scene", "query"),
     ),
     "rigid-cost": Table(
@@ -215,22 +218,24 @@ TABLES = {
     ),
     "robot": Table(
         ("robot-2-cores", "robot-4-of-16-cores", "robot-h100-4-of-16-cores"),
-        {"cores": "cores", "core on": "backend", "answers": "answers", "dropped": "dropped"}
-        | _to(1, answers_a_second="answers_hz")
+        {"cores": "cores", "core on": "backend", "results": "answers", "dropped": "dropped"}
+        | _to(1, results_per_second="answers_hz")
         | {
             f"{name}, ms: median / p95": joined(f"{part}_median_ms", f"{part}_p95_ms", digits=2, between=" / ")
-            for name, part in (("sent to answer", "whole"), ("detection", "detection"), ("core", "core"))
+            for name, part in (("frame to result", "whole"), ("detection", "detection"), ("core", "core"))
         },
         _robots,
     ),
     "tiers": Table(
         ("accuracy-4-cores",),
-        {"scene": "scene"} | {f"`{t}`": cell(t, shown=_tier) for t in TIERS} | {"missed + spurious": "wrong"},
+        {"scene": "scene"}
+        | {f"`{t}`": cell(t, shown=_tier) for t in TIERS}
+        | {"false negatives + false positives": "wrong"},
         _whole_scenes,
     ),
     "wrong-answers": Table(
         ("accuracy-4-cores", "accuracy-distance-2-cores"),
-        {"queries: missed + spurious": "kind", "of": "of"} | {f"`{tier}`": tier for tier in TIERS},
+        {"queries: false negatives + false positives": "kind", "of": "of"} | {f"`{tier}`": tier for tier in TIERS},
         _wrong_answers,
     ),
     "options": Table(
@@ -250,14 +255,14 @@ TABLES = {
         | _same("triangles", "contacts")
         | {"CPU, ms": "cpu_median_ms", "host to host": "host_median_ms", "device to host": "to_host_median_ms"}
         | {"device to device": "median_ms", "graph": "graph_median_ms"}
-        | {"bytes a triangle": lambda row: row["bytes"] / row["triangles"]},
+        | {"bytes per triangle": lambda row: row["bytes"] / row["triangles"]},
         lambda rows: [row for row in rows if row["part"] in ("device", "large")],
     ),
     "latency": Table(
         ("ros-4-cores",),
         {"scene": "scene", "MB in, out": lambda row: f"{row['mb_in']:.2g}, {row['mb_out']:.2g}"}
         | {"contacts": "contacts", "core, ms": "core_median_ms"}
-        | _triples(1, node_without_its_core="node", echo="echo")
+        | _triples(1, node_without_core="node", echo="echo")
         | {"node / echo": joined("ratio", digits=2)},
         only(what="latency"),
     ),
@@ -276,11 +281,11 @@ TABLES = {
                 "random approaches": "trials",
                 "steps, each decided by brute force": "steps",
                 "steps that come closer than stop_distance": "near",
-                "of these without stop": "missed",
-                "rises of stop": "rises",
+                "of these without stop (false negatives)": "missed",
+                "times that stop became true": "rises",
                 "of these later than a frame": "late",
-                "other steps with stop": "false",
-                "ms from the frame to stop: median, p95, p99, most": joined(*(f"{p}_ms" for p in STOPS)),
+                "other steps with stop (false positives)": "false",
+                "ms from the frame to stop: median, p95, p99, maximum": joined(*(f"{p}_ms" for p in STOPS)),
             }
         )(only(what="approaches")(rows)),
     ),
@@ -290,14 +295,14 @@ TABLES = {
         _counts(
             {
                 "vertex messages sent": "sent",
-                "lost by DDS, and counted": "middleware",
-                "answered": "answered",
-                "dropped, and counted": "dropped",
+                "lost by DDS, all counted": "middleware",
+                "results": "answered",
+                "dropped, all counted": "dropped",
                 "changes of topology": "topologies",
-                "answers computed again, all equal": "checked",
-                "requests to `~/detect`, all answered": "requests",
-                "wrong vertex messages sent": lambda row: sum(row["wrong_sent"].values()),
-                "ends of a publisher, SIGTERM and SIGKILL": joined("publisher_ended", "publisher_killed", digits=0),
+                "results recomputed, all identical": "checked",
+                "requests to `~/detect`, all with a response": "requests",
+                "invalid vertex messages sent": lambda row: sum(row["wrong_sent"].values()),
+                "publishers ended by SIGTERM, by SIGKILL": joined("publisher_ended", "publisher_killed", digits=0),
             }
         ),
     ),
@@ -332,7 +337,7 @@ def _source(name: str, kept: dict) -> str:
     machine, others = kept["machine"], kept["other_processes_share"]
     gpus = ", ".join(f"{machine['gpus'].count(gpu)} x {gpu}" for gpu in dict.fromkeys(machine["gpus"]))
     where = f"{machine['processor']}, {machine['cores']} cores{', ' if gpus else ''}{gpus}"
-    busy = f", others took {100 * others:.0f} %" if others > 0.05 else ""
+    busy = f", other programs used {100 * others:.0f} %" if others > 0.05 else ""
     commit = f"commit {machine['commit'][:7]}, {machine['date'].split()[0]}"
     return f"`{kept['command']}`; {where}{busy}; {commit}; [JSON](../test/bench/results/{name}.json)"
 
