@@ -16,7 +16,7 @@ __all__ = ["COMPRESSIONS", "HPCCD_RECORD", "BagWriter", "Topic"]
 class BagWriter:
     """One recording: a single file, or a folder of files in rosbag2's layout, split by size or duration.
 
-    path: ends in `.mcap`: one file, which `ros2 bag play` opens alone. Otherwise a folder, made here, with
+    path: ends in `.mcap`: one file, complete on its own. Otherwise a new folder, with
     `NAME_0.mcap`, `NAME_1.mcap`, ... and `metadata.yaml` of the finished ones.
     info: JSON-able dict, stored with each file for the replay (see `reader.Recording.info`).
     attachments: (name, bytes) of files that a replay needs, stored with each file too.

@@ -1,22 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measure your own recording or mesh file, or a generated scene, on this machine; print tables and write JSON.
+"""Measure a recording, a mesh file or a generated scene on this machine; print tables and write JSON.
 
   hpccd bench cpu run.mcap                  ms a step of a recording, and its stages
   hpccd bench gpu run.mcap                  CPU, hybrid and GPU side by side
   hpccd bench accuracy run.mcap --choose "misses<1e-4"
-                                            the cheapest setting that is accurate enough for this recording
+                                            the cheapest setting within this error
   hpccd bench <benchmark> --help            options and examples of one benchmark
 
-Close other programs first: the result says how busy they were.
+Close other programs first; the result includes the load of the machine.
 """
 
 import argparse
 import importlib
 
 BENCHMARKS = {
-    "cpu": "ms a step of each scene and its stages",
-    "gpu": "CPU, hybrid and GPU side by side, with transfers and without",
-    "accuracy": "the tiers: time, missed and spurious contacts, error of times; the cheapest one that is good enough",
+    "cpu": "ms per step of each scene, and of each stage",
+    "gpu": "CPU, hybrid and GPU compared, with and without transfers",
+    "accuracy": "tiers compared: time, false negatives and positives, error of times; the cheapest within bounds",
 }
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cut a part out of a recording. The part replays by itself: all that is in force at its beginning is copied too
-(topologies, static meshes, shapes, descriptions, transforms, joint states), and the node's parameters and mesh files.
+"""Copy a part of a recording into a new one that replays on its own: the state at its beginning is copied too
+(topologies, static meshes, shapes, descriptions, transforms, joint states), with the node's parameters and mesh files.
 
   hpccd cut run.mcap --from 10 --to 20 -o part.mcap      from second 10 to second 20
   hpccd cut run.mcap --to 12.5 -o before.mcap            two parts without a gap or overlap: messages received at
@@ -9,9 +9,9 @@
                                                          from the frame with this stamp, as `hpccd replay` prints it
   hpccd cut run/ --from 3600 -o late.mcap                a split recording, across all its files
 
-Times are seconds since the first message of the recording was received, or stamps of frames in nanoseconds (with the
-suffix ns; the frame at --to is included). Answers to steps that began before the part are kept but cannot be verified:
-`hpccd replay` counts them. Channels of other encodings are copied unchanged.
+Times are seconds since the first message of the recording was received, or stamps of frames in nanoseconds with the
+suffix ns (the frame at --to is included). Results of steps that began before the part are kept but cannot be verified;
+`hpccd replay` counts them. Channels with other encodings are copied unchanged.
 """
 
 from pathlib import Path
@@ -21,12 +21,10 @@ from hpccd_ros.base.errors import UserError
 
 def configure(parser):
     parser.add_argument("file", metavar="FILE", help="recording: an .mcap file, or a folder of them")
-    parser.add_argument("--from", dest="begin", metavar="TIME", help="begin of the part (default: that of FILE)")
-    parser.add_argument("--to", dest="end", metavar="TIME", help="end of the part (default: that of FILE)")
+    parser.add_argument("--from", dest="begin", metavar="TIME", help="where the part begins (default: as FILE)")
+    parser.add_argument("--to", dest="end", metavar="TIME", help="where the part ends (default: as FILE)")
     parser.add_argument("-o", "--output", metavar="OUT", required=True, help="new file, NAME.mcap")
-    parser.add_argument(
-        "--compression", choices=("none", "lz4", "zstd"), help="compression of OUT (default: that of FILE)"
-    )
+    parser.add_argument("--compression", choices=("none", "lz4", "zstd"), help="compression of OUT (default: as FILE)")
 
 
 def run(args) -> int:

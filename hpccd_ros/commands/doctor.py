@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Check recordings record by record, with their check sums and against their index; save what is readable of a damaged
-one.
+"""Check recordings record by record, with their checksums and their index; recover the readable part of a damaged one.
 
-  hpccd doctor run.mcap                          what is in it, and whether it is sound
+  hpccd doctor run.mcap                          its content, and whether it is sound
   hpccd doctor run.mcap --recover saved.mcap     copy every whole message into a new, finished file
   hpccd doctor run/                              every file of a split recording
 
-A recorder that is killed (SIGKILL, power of its process, not of the machine) leaves a file without an index. All
-that it had flushed, by default all but the last half second, is whole: --recover makes it a recording again.
-Exit status: 0 sound (or recovered), 1 damaged, 2 unusable: no recording, nothing to save, no file (a pipe, a device).
+A recorder that is killed (SIGKILL) leaves a file without an index. The data it had flushed, by default all but the
+last half second, is intact; --recover writes it into a complete recording.
+Exit status: 0 sound or recovered; 1 damaged; 2 unusable: not a recording, nothing to recover, or not a regular file.
 """
 
 from hpccd_ros.base.errors import UserError
@@ -20,7 +19,7 @@ def configure(parser):
     parser.add_argument(
         "--compression",
         choices=("none", "lz4", "zstd"),
-        help="of the recovered file (default: that of the damaged one)",
+        help="compression of the recovered file (default: as the damaged one)",
     )
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is installed here: versions, backends and accuracy tiers that can be used, processor, DDS settings.
+"""Show what is installed: versions, usable backends and accuracy tiers, processor, DDS settings.
 
-hpccd info           for people; put it into bug reports
-hpccd info --json    for programs
+hpccd info           as text, for bug reports
+hpccd info --json    as JSON, for programs
 """
 
 import json
@@ -41,7 +41,7 @@ SETTINGS = (
 
 
 def configure(parser):
-    parser.add_argument("--json", action="store_true", help="as one JSON object")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def gather() -> dict:
@@ -84,7 +84,7 @@ def run(args) -> int:
 
 
 def _gpu(status) -> dict[str, str]:
-    """What of GPUs was found, and why not more."""
+    """The GPUs found, and why others are not usable."""
     found = {"CUDA code in this build": status["toolkit"] if status["compiled"] else "none"}
     for d in status["devices"]:
         found[f"device {d['number']}"] = (
@@ -102,7 +102,7 @@ def _processor() -> str:
             if line.startswith("model name"):
                 return line.partition(":")[2].strip()
     except OSError:
-        pass  # not Linux, or not readable: the next line tells less
+        pass  # not Linux, or not readable: the next line is less detailed
     return platform.processor() or platform.machine()
 
 

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Record what goes into a running node (mesh topologies, vertices, points, transforms that it applies) and what comes
-out of it (contacts, smallest distances), exactly as it goes over the wire, with the node's parameters beside it.
+"""Record the inputs of a running node (topologies, vertices, points, transforms that it uses), its results (contacts,
+smallest distances), both as the bytes on the wire, and its parameters.
 
   hpccd record                          the node /hpccd, into ./hpccd-<date>.mcap, until Ctrl-C
   hpccd record -o run.mcap --node /arm/hpccd --duration 60
   hpccd record -o run --split-size 512 --compression zstd
-                                        a folder run/ in the layout of rosbag2, a new file each 512 MB,
-                                        before compression
+                                        a folder run/ in rosbag2's layout, with a new file every 512 MB
+                                        (before compression)
 
-The files play with `ros2 bag play`, open in Foxglove, and `hpccd replay` verifies them. Ctrl-C (SIGINT) and
-SIGTERM finish the file. Killed otherwise, it keeps all but the last half second (--flush): `hpccd doctor`.
-A disk that refuses (full) ends the file at its last whole chunk; messages lost are counted (exit status 1), and a new
-file is tried every 5 seconds. A node can also record itself: its parameter `record`.
-A node whose topics are remapped: give the same remappings here, after --ros-args.
+`hpccd replay` verifies a recording. Ctrl-C (SIGINT) and SIGTERM complete the file. After SIGKILL it lacks at most the
+last half second (--flush); `hpccd doctor` recovers it. On a write error (full disk), the file ends at its last whole
+chunk, lost messages are counted (exit status 1), and a new file is tried every 5 seconds.
+A node can also record itself: see its parameter `record`. If the node's topics are remapped, give the same remappings
+here, after --ros-args.
 """
 
 import math
@@ -35,36 +35,36 @@ def configure(parser):
         "--compression",
         choices=("none", "lz4", "zstd"),
         default="none",
-        help="lz4: about half the writing speed; zstd: smaller, a fifth (default: %(default)s)",
+        help="lz4: about half the write speed of none; zstd: smaller files, a fifth of it (default: %(default)s)",
     )
     parser.add_argument(
-        "--split-size", type=float, default=0, metavar="MB", help="new file after so many megabytes, before compression"
+        "--split-size", type=float, default=0, metavar="MB", help="size at which a new file begins, before compression"
     )
-    parser.add_argument("--split-time", type=float, default=0, metavar="S", help="new file after so many seconds")
+    parser.add_argument("--split-time", type=float, default=0, metavar="S", help="time after which a new file begins")
     parser.add_argument(
         "--flush",
         type=float,
         default=0.5,
         metavar="S",
-        help="most seconds of messages that a kill can cost (default: %(default)s)",
+        help="seconds of messages that SIGKILL can lose at most (default: %(default)s)",
     )
     parser.add_argument(
         "--depth",
         type=int,
         default=50,
         metavar="N",
-        help="messages a topic that may wait for the disk (default: %(default)s)",
+        help="queue of each topic, in messages (default: %(default)s)",
     )
-    parser.add_argument("--duration", type=float, default=0, metavar="S", help="end after so many seconds")
-    parser.add_argument("--frames", type=int, default=0, metavar="N", help="end after so many contact messages")
+    parser.add_argument("--duration", type=float, default=0, metavar="S", help="end after this time")
+    parser.add_argument("--frames", type=int, default=0, metavar="N", help="end after N contact messages")
     parser.add_argument(
         "--wait",
         type=float,
         default=10,
         metavar="S",
-        help="how long to wait for the node to appear (default: %(default)s)",
+        help="seconds to wait for the node (default: %(default)s)",
     )
-    parser.add_argument("--ros-args", nargs="...", default=[], help="remappings and the like, as for any ROS program")
+    parser.add_argument("--ros-args", nargs="...", default=[], help="ROS arguments, such as remappings")
 
 
 def run(args) -> int:

@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compute recordings again, without DDS and as fast as it goes, and compare every contact, every time, the hash
-and every smallest distance with what the node had answered. Or play one over DDS instead, to a node (--publish).
+"""Recompute recordings without DDS, at full speed, and compare every contact, time, hash and smallest distance with the
+recorded results of the node. Or publish a recording over DDS (--publish).
 
   hpccd replay run.mcap                     verify; exit status 1 names the first frame and pair that differ
   hpccd replay run.mcap --threads 1 --backend cpu
-                                            the contacts may not depend on either
-  hpccd replay run.mcap --csv steps.csv     one row for each step: contacts, first time, separation, ms, hash
-  hpccd replay run.mcap --from 10 --step    from the tenth second, one step at each Enter
-  hpccd replay bugs/*.mcap --json all.json  many at once, in processes of this machine, as one table
+                                            contacts do not depend on either
+  hpccd replay run.mcap --csv steps.csv     one row per step: contacts, first time, separation, ms, hash
+  hpccd replay run.mcap --from 10 --step    from second 10, one step per Enter
+  hpccd replay bugs/*.mcap --json all.json  many at once, in local processes, as one table
   hpccd replay bugs/*.mcap --scheduler tcp://head:8786
-                                            on a Dask cluster, whose workers see the files under the same names
-  hpccd replay run.mcap --publish --rate 2  play the meshes to a node, twice as fast as they were recorded
+                                            on a Dask cluster whose workers see the files under the same names
+  hpccd replay run.mcap --publish --rate 2  publish the meshes at twice the recorded speed
 
-FILE is an .mcap file or a folder of them. Recordings of `ros2 bag record` work too, with --params naming the
-parameter file of the node; what the node would not start with is refused. Recordings without contacts are computed
-only, from each frame to the next. Many at once need the extra "cluster" (Dask).
+FILE is an .mcap file or a folder of them. Recordings of other MCAP writers need --params, the parameter file of the
+node; parameters that the node rejects are rejected here too. Recordings without contacts are computed, not compared.
+Many at once need the extra "cluster" (Dask).
 """
 
 import math
@@ -33,26 +33,26 @@ def configure(parser):
         "--accuracy",
         default="",
         metavar="TIER",
-        help="fast, balanced, conservative, exact (default: as recorded); another one may differ",
+        help="fast, balanced, conservative, exact (default: as recorded); results of another tier may differ",
     )
     verify.add_argument(
         "--features",
         default=(),
         type=feature_list,
         metavar="KIND[,KIND]",
-        help="test vertex_face, edge_edge or both (default: as recorded); other ones differ",
+        help="vertex_face, edge_edge or both (default: as recorded); results of other features differ",
     )
     verify.add_argument(
-        "--csv", metavar="FILE", help="write a table with one row for each step, or of many recordings one for each"
+        "--csv", metavar="FILE", help="write a table with one row per step; of many recordings, one row per recording"
     )
-    verify.add_argument("--json", metavar="FILE", help="write what came of each recording")
+    verify.add_argument("--json", metavar="FILE", help="write the result of each recording")
     verify.add_argument("--keep-going", action="store_true", help="list every step that differs, not only the first")
     when = parser.add_argument_group("when, of one recording")
     when.add_argument(
         "--rate",
         type=float,
         metavar="X",
-        help="speed, 1: as recorded, 0: without pauses (default: 0, with --publish 1)",
+        help="speed; 1: as recorded, 0: without pauses (default: 0; with --publish 1)",
     )
     when.add_argument(
         "--from",
@@ -60,27 +60,27 @@ def configure(parser):
         type=float,
         default=0.0,
         metavar="S",
-        help="start so many seconds into the recording (default: %(default)s)",
+        help="start at second S of the recording (default: %(default)s)",
     )
-    when.add_argument("--to", dest="end", type=float, default=float("inf"), metavar="S", help="end there")
+    when.add_argument("--to", dest="end", type=float, default=float("inf"), metavar="S", help="end at second S")
     when.add_argument("--step", action="store_true", help="wait for Enter at each frame")
     many = parser.add_argument_group("many recordings at once")
-    many.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster (default: processes of this machine)")
-    many.add_argument("--jobs", type=int, default=0, metavar="N", help="local processes; 0: one a core (default)")
+    many.add_argument("--scheduler", metavar="ADDRESS", help="address of a Dask cluster (default: local processes)")
+    many.add_argument("--jobs", type=int, default=0, metavar="N", help="local processes; 0: one per core (default)")
     play = parser.add_argument_group("play over DDS")
     play.add_argument("--publish", action="store_true", help="publish the recorded meshes instead of verifying")
-    play.add_argument("--all", action="store_true", help="publish every recorded topic, contacts too")
+    play.add_argument("--all", action="store_true", help="publish every recorded topic, including contacts")
     play.add_argument(
-        "--wait", type=float, default=10.0, metavar="S", help="how long to wait for subscribers (default: %(default)s)"
+        "--wait", type=float, default=10.0, metavar="S", help="seconds to wait for subscribers (default: %(default)s)"
     )
     play.add_argument(
         "--subscribers",
         type=int,
         default=1,
         metavar="N",
-        help="how many to wait for: 2 for a node and a recorder (default: %(default)s)",
+        help="number to wait for; 2 for a node and a recorder (default: %(default)s)",
     )
-    play.add_argument("--ros-args", nargs="...", default=[], help="remappings and the like, as for any ROS program")
+    play.add_argument("--ros-args", nargs="...", default=[], help="ROS arguments, such as remappings")
 
 
 def run(args) -> int:

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Look at recorded steps: pictures of shaded meshes with contacts coloured by their time in the step, a page for any
-browser, or all of it in the Rerun viewer.
+"""View recorded steps: pictures of shaded meshes with contacts coloured by time of impact, an interactive HTML page, or
+the Rerun viewer.
 
-  hpccd view run.mcap                       the step with most contacts, into run.png
+  hpccd view run.mcap                       write the step with the most contacts to run.png
   hpccd view run.mcap --step 30 -o frame.png
-  hpccd view run.mcap --every 1 -o frames   a sequence frames/000000.png, ... of every step, for a film
-  hpccd view run.mcap --html run.html       one file to turn, play and step in a browser, without a network
-  hpccd view run.mcap --rerun               opens the Rerun viewer; without a screen, writes run.rrd
-  hpccd view run.mcap -o run.rrd            meshes, contacts, normals and curves on a timeline, to open elsewhere
+  hpccd view run.mcap --every 1 -o frames   write every step as frames/000000.png, ..., for a video
+  hpccd view run.mcap --html run.html       write an interactive page that needs no network
+  hpccd view run.mcap --rerun               open the Rerun viewer; without a screen, write run.rrd
+  hpccd view run.mcap -o run.rrd            write meshes, contacts, normals and curves for Rerun
 
-Pictures need no display and no graphics driver. Pages need the extra "page", Rerun the extra "rerun".
+Pictures need neither display nor graphics driver. Pages need the extra "page", Rerun the extra "rerun".
 """
 
 import math
@@ -25,27 +25,31 @@ def configure(parser):
         metavar="PATH",
         help="picture (.png, .jpg, .pdf), page (.html), Rerun recording (.rrd), or folder with --every",
     )
-    parser.add_argument("--html", metavar="PATH", help="write a page that any browser opens, without a network")
+    parser.add_argument("--html", metavar="PATH", help="write an interactive HTML page that needs no network")
     parser.add_argument(
-        "--rerun", action="store_true", help="open the Rerun viewer; where there is no screen, write a Rerun recording"
+        "--rerun", action="store_true", help="open the Rerun viewer; without a screen, write a Rerun recording"
     )
     which = parser.add_mutually_exclusive_group()
-    which.add_argument("--step", type=int, metavar="N", help="step number (default: the one with most contacts)")
+    which.add_argument("--step", type=int, metavar="N", help="step number (default: the one with the most contacts)")
     which.add_argument(
         "--every",
         type=int,
         metavar="K",
-        help="each K-th step, into a folder, the page or the Rerun recording (those: default 1)",
+        help="every K-th step, into a folder, the page or the Rerun recording (the last two: default 1)",
     )
     parser.add_argument(
         "--azimuth",
         type=float,
         default=-60.0,
         metavar="DEG",
-        help="from where to look, around z (default: %(default)s)",
+        help="view angle around z (default: %(default)s)",
     )
     parser.add_argument(
-        "--elevation", type=float, default=26.0, metavar="DEG", help="and from how high (default: %(default)s)"
+        "--elevation",
+        type=float,
+        default=26.0,
+        metavar="DEG",
+        help="view angle above the horizon (default: %(default)s)",
     )
     parser.add_argument("--title", help="default: the name of the file")
     parser.add_argument("--params", metavar="YAML", help="node parameters, instead of those in the recording")
