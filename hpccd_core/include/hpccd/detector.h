@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Answers for one scene in motion.
+// The detector: queries of one scene.
 #pragma once
 
 #include <cstdint>
@@ -20,85 +20,85 @@ namespace hpccd {
 inline namespace v0_1 {
 
 /// Continuous collision detection of a scene whose vertices move on straight lines from `vertices_t0` to `vertices_t1`
-/// while t goes from 0 to 1 (Kim et al. 2009, section 3.1). Touching counts; what touches at t = 0 has time 0. Features
-/// that share a vertex are no pair.
+/// while t goes from 0 to 1 (Kim et al. 2009, section 3.1). Touching counts; a contact at t = 0 has time 0. Features
+/// that share a vertex are never paired.
 ///
-/// All memory that the steps need is kept from call to call, so use one detector for all steps of a scene.
+/// A detector keeps its memory from call to call, so use one detector for all steps of a scene.
 ///
-/// Threads: one call at a time; of those that several threads make of one detector, each waits until the one before has
-/// ended. Threads that are to work side by side need a detector each; the scene may be the same. Only cancel(),
-/// options() and last_backend() do not wait. A child made by fork() has none of a detector's threads: its queries throw
-/// std::runtime_error there unless it has one thread only and was in no call; it may be destroyed.
+/// Threads: a detector runs one call at a time; concurrent calls wait for each other. For parallel calls use one
+/// detector per thread; they may share a scene. Only cancel(), busy(), options() and last_backend() never wait. A child
+/// process created by fork() has none of a detector's threads: queries throw std::runtime_error there, unless the
+/// detector has one thread and was in no call. It may be destroyed.
 ///
-/// Errors: every query throws InvalidArgument for positions whose number, type or values will not do (see Positions),
-/// and Cancelled after cancel(). The detector can be used on after the former, and after std::bad_alloc, when the next
-/// call takes as long as a first one.
-/// Failures of a GPU are no errors: the step is computed on the CPU, and last_gpu_error() tells why.
+/// Errors: every query throws InvalidArgument if the number, type or values of positions are invalid (see Positions),
+/// and Cancelled after cancel(). The detector remains usable after InvalidArgument and after std::bad_alloc; after the
+/// latter the next call takes as long as a first one. A failure of a GPU is not an error: the CPU computes the step,
+/// and last_gpu_error() returns the cause.
 class HPCCD_API Detector {
  public:
-  /// Throws InvalidArgument for a null scene and an option that will not do here, std::runtime_error where the system
-  /// starts fewer threads.
+  /// Throws InvalidArgument if the scene is null or an option is invalid, and std::runtime_error if the system cannot
+  /// start the threads.
   Detector(std::shared_ptr<const Scene> scene, Options options);
-  /// Waits for no call: destroy it when none is under way.
+  /// Must not be called while a query is running.
   ~Detector();
   Detector(const Detector&) = delete;
   Detector& operator=(const Detector&) = delete;
 
-  /// All contacts of the motion, or those that Options::report wants.
+  /// Contacts of the motion, as selected by Options::report.
   Contacts detect(Positions vertices_t0, Positions vertices_t1);
-  /// The same, without a copy where there need be none. Both refuse, as proximity and intersections do, a detector
-  /// whose results stay on the device.
+  /// The same, without a copy of rows that a GPU has written. Like detect, proximity and intersections, throws
+  /// InvalidArgument if results stay on the device.
   Detected detect_in_place(Positions vertices_t0, Positions vertices_t1);
 
-  /// The largest part of the motion, in [0, 1], that is certainly free of contacts, whatever Options::report says: at
-  /// the tiers exact and conservative never beyond the earliest one and at most 1e-9 before it, else that of the
-  /// earliest one found. 1 where nothing touches. Of several worlds: of all of them.
+  /// The largest part of the motion, in [0, 1], that is certainly free of contacts, whatever Options::report is. At the
+  /// tiers exact and conservative it never exceeds the true time of impact and is at most 1e-9 smaller; at the others
+  /// it is the earliest time found. 1 without contacts. For several worlds, the minimum of all.
   double collision_free_step(Positions vertices_t0, Positions vertices_t1);
-  /// The same of each world by itself.
+  /// The same for each world.
   std::vector<double> collision_free_steps(Positions vertices_t0, Positions vertices_t1);
 
-  /// Vertex-face and edge-edge pairs within this distance of each other, Euclidean, between closed features, in units
-  /// of the coordinates. Finite, >= 0, else InvalidArgument.
+  /// Vertex-face and edge-edge pairs within a Euclidean distance, in units of the coordinates. Throws InvalidArgument
+  /// unless distance is finite and >= 0.
   Proximity proximity(Positions vertices, double distance);
-  /// Edges and faces that share a point but no vertex.
+  /// Edges and faces that share a point but no vertex, coplanar pairs included.
   Intersections intersections(Positions vertices);
-  /// The smallest distance of each enabled pair of meshes, by (mesh_a, mesh_b), mesh_a <= mesh_b. Of pairs of features
-  /// whose distances are the same double the first in order, vertex-face before edge-edge. Of several worlds those of
-  /// the first, then those of the second, ...: as many of each.
+  /// The smallest distance of each enabled pair of meshes, sorted by (mesh_a, mesh_b), with mesh_a <= mesh_b. Of
+  /// several pairs of features with the same distance (as a double), the first in canonical order is returned. For
+  /// several worlds, all pairs of the first world, then all pairs of the second, and so on.
   std::vector<Gap> distances(Positions vertices);
 
-  /// The same as the ones without _on_device, of a detector whose Options::results_on_device says so, else
-  /// InvalidArgument. What the CPU had to compute, after a failure of the device, is brought there. Throws
-  /// std::runtime_error where that fails too.
+  /// As detect, proximity and intersections, with results on the device. Throws InvalidArgument unless
+  /// Options::results_on_device is set. If the device fails, the CPU computes the results and they are copied to the
+  /// device; throws std::runtime_error if that fails too.
   DeviceResults detect_on_device(Positions vertices_t0, Positions vertices_t1);
   DeviceResults proximity_on_device(Positions vertices, double distance);
   DeviceResults intersections_on_device(Positions vertices);
-  /// For detect_on_device() of arrays on the device that stay where they are, without a look from the host: with room
-  /// for `room` times, 1 to 1000, what the motion that they hold now takes. Throws InvalidArgument where outputs were
-  /// asked for, std::runtime_error where the device fails.
+  /// A detection on fixed device arrays that a CUDA graph can contain. Its lists and rows have `room` times, 1 to 1000,
+  /// the size that the present motion in the arrays needs. Throws InvalidArgument if outputs are requested, and
+  /// std::runtime_error if the device fails.
   std::unique_ptr<PreparedDetection> prepare(Positions vertices_t0, Positions vertices_t1, double room);
 
-  /// As Scene::set_separation, from the next call on, which fits its boxes to it as to any motion.
+  /// As Scene::set_separation, from the next call on. Nothing is rebuilt.
   void set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
-  /// Of all pairs of n meshes at once: n * n numbers, row by row; those of a pair are the same in both places.
+  /// Sets the separations of all pairs of n meshes: a symmetric n x n matrix, row by row.
   void set_separations(std::span<const double> of_pairs);
 
-  /// From any thread, without waiting: a query under way, those that wait for it, and all later ones throw Cancelled,
-  /// within 10 ms. What is on a GPU already comes to its end first.
+  /// Cancels the detector: a running query, waiting ones and all later ones throw Cancelled, within 10 ms. Work that is
+  /// already on a GPU runs to its end first. Thread-safe; does not wait.
   void cancel();
 
-  // Of the last call; while one is under way, of that one when it has ended. Empty, or less, after one that has thrown.
-  std::map<std::string, double> profile() const;       ///< stage -> ms, with "total" and the remainder
+  // Data of the last call; these wait for a running one. They may be empty or incomplete after a call that has thrown.
+  std::map<std::string, double> profile() const;       ///< stage -> ms, with "total" and the remainder "other"
   std::map<std::string, std::uint64_t> stats() const;  ///< counts of pairs, tests, contacts, bytes
-  std::string last_gpu_error() const;                  ///< why a step meant for the GPU was computed on the CPU, or ""
-  // These do not wait.
-  bool busy() const;               ///< whether the others would wait now, for a call of another thread
-  const Options& options() const;  ///< with the number of threads and the instruction set that were chosen
-  Backend last_backend() const;    ///< where the last step was computed
+  std::string last_gpu_error() const;                  ///< why the CPU computed a step for the GPU, or ""
+  // These never wait.
+  bool busy() const;               ///< whether a call of another thread is running
+  const Options& options() const;  ///< with the threads and instruction set in use
+  Backend last_backend() const;    ///< backend of the last step
 
  private:
   struct HPCCD_HIDDEN Impl;
-  std::shared_ptr<Impl> impl_;  // also of what it has prepared
+  std::shared_ptr<Impl> impl_;  // shared with prepared detections
 };
 
 }  // namespace v0_1

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Elementary queries one by one, without a scene.
+// Elementary tests of single pairs of features, without a scene.
 #pragma once
 
 #include <array>
@@ -11,16 +11,20 @@
 namespace hpccd {
 inline namespace v0_1 {
 
-/// One query: rows of x y z, v f0 f1 f2 (vertex-face) or a0 a1 b0 b1 (edge-edge) at t = 0, then the same at t = 1.
+/// One pair of features in motion, as eight rows of x y z. Vertex-face: v, f0, f1, f2 at t = 0, then at t = 1.
+/// Edge-edge: a0, a1, b0, b1 at t = 0, then at t = 1.
 using Query = std::array<double, 24>;
 
-/// Whether the two features of each query touch, or come within Options::minimum_separation, during the step, and when.
-/// Of the options only accuracy, simd and minimum_separation matter.
-/// hit, toc: room for queries.size() answers each; toc in [0, 1], infinite where there is no hit.
-/// Throws InvalidArgument for a coordinate that is not finite or beyond 1e150 in magnitude, a minimum_separation that
-/// is negative or not finite, and an instruction set that this machine lacks. From any number of threads at once; the
-/// work is the caller's thread's.
+/// Vertex-face tests: decides whether a vertex and a triangle touch, or come within Options::minimum_separation, during
+/// the step, and when.
+///
+/// Of the options, only accuracy, simd and minimum_separation are used. hit and toc are arrays of queries.size()
+/// elements that the call fills. toc is the time of impact in [0, 1], infinite without a hit.
+///
+/// Throws InvalidArgument if a coordinate is not finite or exceeds 1e150 in magnitude, if minimum_separation is
+/// negative or not finite, or if the machine lacks the instruction set. Thread-safe; runs on the caller's thread.
 HPCCD_API void test_vertex_face(std::span<const Query> queries, const Options& options, bool* hit, double* toc);
+/// Edge-edge tests; otherwise as test_vertex_face.
 HPCCD_API void test_edge_edge(std::span<const Query> queries, const Options& options, bool* hit, double* toc);
 
 }  // namespace v0_1

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The public C++ interface of hpccd, all of it: continuous collision detection of deforming triangle meshes.
+/// The complete public C++ interface of hpccd: continuous collision detection of deforming triangle meshes.
 ///
 ///     auto scene = std::make_shared<hpccd::Scene>();
 ///     scene->add_mesh("cloth", faces, n_vertices);
 ///     hpccd::Detector detector(scene, hpccd::Options{});
 ///     hpccd::Contacts contacts = detector.detect(hpccd::Positions::of(start), hpccd::Positions::of(end));
 ///
-/// Nothing here prints or ends the process: errors are thrown. One soname (libhpccd_core.so.0.1) and one inline
-/// namespace (hpccd::v0_1) stand for one binary interface: what was compiled against another is refused by the linker
-/// and the loader, and never runs on types that have changed.
+/// The library never prints and never ends the process; errors are exceptions. The soname (libhpccd_core.so.0.1) and
+/// the inline namespace (hpccd::v0_1) identify the binary interface: a program compiled against another version does
+/// not link or load.
 #pragma once
 
 #include "hpccd/detector.h"

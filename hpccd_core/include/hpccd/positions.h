@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the vertices are.
+// Positions of vertices.
 #pragma once
 
 #include <cstddef>
@@ -12,24 +12,25 @@
 namespace hpccd {
 inline namespace v0_1 {
 
-/// Positions of all vertices of a scene at one time: n rows of x y z without gaps, float or double, in any unit (all
-/// lengths of a scene are in the same). They are taken exactly as given. Every coordinate must be finite and at most
-/// 1e150 in magnitude, 1e300 where one time is asked for; the call that finds another throws InvalidArgument and names
-/// it.
+/// Positions of all vertices of a scene at one time: n contiguous rows of x y z, float or double. All lengths of a
+/// scene are in the same unit, which is free. Coordinates are taken exactly as given. Each must be finite and at most
+/// 1e150 in magnitude (1e300 for queries of one frame); otherwise the call throws InvalidArgument and names the
+/// coordinate.
 ///
-/// The memory is the caller's, is only read, and only during the call.
+/// The caller owns the memory. It is only read, and only during the call.
 struct Positions {
-  const void* data = nullptr;
-  std::size_t n = 0;
-  bool is_double = true;
-  bool on_device = false;  ///< data is in a GPU's memory
-  /// On a device: the stream (cudaStream_t) after whose work so far they are there; without one, after all of the
-  /// device's. On the host it counts where results stay on the device: rows of earlier ones that nobody holds any more
-  /// are written when that work, which may still read them, has ended. One that is no stream of that device is refused
-  /// where CUDA says so; an address at which there is no stream at all may crash in CUDA.
+  const void* data = nullptr;  ///< n rows of three numbers
+  std::size_t n = 0;           ///< number of rows
+  bool is_double = true;       ///< double, else float
+  bool on_device = false;      ///< data is in a GPU's memory
+  /// The stream (cudaStream_t) that computes the positions: the call waits for the work enqueued there so far; without
+  /// a stream, for all work on the device. With results on the device it also matters for positions on the host: the
+  /// memory of earlier results that are no longer held is written only after that work, which may still read it. An
+  /// invalid stream throws InvalidArgument if CUDA notices; an arbitrary address may crash in CUDA.
   std::optional<void*> made_on = std::nullopt;
 
-  /// Of x y z one after the other, on the host. Throws InvalidArgument for a length that is no multiple of 3.
+  /// Positions on the host, from x y z of each vertex in turn. Throws InvalidArgument if the length is not a multiple
+  /// of 3.
   static Positions of(std::span<const double> xyz) { return {xyz.data(), rows(xyz.size()), true}; }
   static Positions of(std::span<const float> xyz) { return {xyz.data(), rows(xyz.size()), false}; }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which meshes there are, and which pairs of them matter.
+// Meshes, and which pairs of them are tested.
 #pragma once
 
 #include <array>
@@ -16,74 +16,80 @@
 namespace hpccd {
 inline namespace v0_1 {
 
-/// What an answer promises:
-///   exact         yes or no as rational arithmetic on the given coordinates; times within 1e-12
-///   conservative  none missed, no time later than it is
-///   balanced      double precision; in doubt only within about 1e-12 of a border
-///   fast          single precision; no promise, times mostly to 1e-3 of the step
+/// Accuracy tiers and their promises:
+///   exact         contacts as rational arithmetic on the given coordinates decides; times within 1e-12
+///   conservative  no false negatives; no time later than the true one
+///   balanced      double precision; errors only within about 1e-12 of a border
+///   fast          single precision; no promise, errors of times mostly below 1e-3 of the step
 enum class Accuracy : std::uint8_t { fast, balanced, conservative, exact };
 
-/// Which pairs of features are tested at all. To test neither is refused: Scene::ignore_pair() says that of two meshes.
+/// Pairs of features that are tested. At least one must be set; to test nothing between two meshes, use
+/// Scene::ignore_pair().
 struct TestedFeatures {
   bool vertex_face = true;
   bool edge_edge = true;
   bool operator==(const TestedFeatures&) const = default;
 };
 
+/// Options of one mesh.
 struct MeshOptions {
-  bool self_collision = true;
-  bool is_static = false;  ///< promised not to move; pairs of two static meshes are never tested
+  bool self_collision = true;  ///< whether contacts within the mesh are reported
+  bool is_static = false;      ///< the mesh never moves; pairs of two static meshes are never tested
 };
 
 class ScenePairs;
 
-/// Meshes of triangles and of edges alone, with their topology. The vertices of all meshes are numbered one after the
-/// other, in the order added: so stand their positions in what a Detector is given, and so count the indices in its
-/// answers.
+/// Meshes of triangles and edges, with fixed topology. Vertices and faces of all meshes are numbered consecutively in
+/// the order added. Positions passed to a Detector and indices in its results use this scene-wide numbering.
 ///
-/// Mesh numbers count from 0 in the order added; a number that no mesh has is refused (InvalidArgument). Where two
-/// numbers are asked for, their order does not matter, and the same number twice means within that mesh.
+/// Mesh numbers count from 0 in the order added; an unknown number throws InvalidArgument. In functions of two meshes
+/// the order of the numbers does not matter, and the same number twice means within that mesh.
 ///
-/// Threads: calls that change a scene need it alone. One that no longer changes may serve any number of threads and
-/// detectors. A detector reads its scene when it is made and later: do not change it from then on.
+/// Threads: a call that changes a scene must not run concurrently with other calls. An unchanging scene may be used by
+/// any number of threads and detectors. Do not change a scene once a detector uses it.
 class HPCCD_API Scene {
-  friend class ScenePairs;  // internal: lists the values set for single pairs
+  friend class ScenePairs;  // internal: lists the values that are set for single pairs
 
  public:
   /// Adds a mesh and returns its number.
-  /// name: one that no other mesh has. faces: 3 indices a triangle into this mesh's own vertices, [0, n_vertices).
-  /// edges: 2 indices each, likewise: those beside the triangles' own, as of a rope or a rod. One that is given twice,
-  /// or is a triangle's too, counts once; one from a vertex to itself is none.
-  /// Throws InvalidArgument for a name that is taken, a length that is no multiple of 3 (2), an index out of range (it
-  /// says which), and where the scene would have more than 2^32 - 2 vertices. Whatever is thrown, the scene is as it
-  /// was.
+  ///
+  /// The name must be unique. faces has 3 indices per triangle, edges 2 per edge, into this mesh's own vertices, from 0
+  /// to n_vertices - 1. edges are those that belong to no triangle, as of a rope. An edge that is given twice, or that
+  /// also belongs to a triangle, counts once; an edge from a vertex to itself is ignored.
+  ///
+  /// Throws InvalidArgument if the name is taken, if a length is not a multiple of 3 (or 2), if an index is out of
+  /// range, or if the scene would have more than 2^32 - 2 vertices. On any exception the scene is unchanged.
   std::uint32_t add_mesh(std::string name, std::span<const std::uint32_t> faces, std::uint32_t n_vertices,
                          MeshOptions options = {}, std::span<const std::uint32_t> edges = {});
 
-  /// Nothing is tested between the two.
+  /// Nothing is tested between the two meshes.
   void ignore_pair(std::uint32_t mesh_a, std::uint32_t mesh_b);
-  /// The accuracy of what is tested between the two, instead of Options::accuracy.
+  /// Sets the accuracy between the two meshes, instead of Options::accuracy.
   void set_accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b, Accuracy accuracy);
-  /// How far apart the two shall stay, in units of the coordinates, instead of Options::minimum_separation. Finite, >=
-  /// 0, else InvalidArgument.
+  /// Sets the minimum separation of the two meshes, instead of Options::minimum_separation, in units of the
+  /// coordinates. Throws InvalidArgument unless it is finite and >= 0.
   void set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
-  /// What is tested between the two, instead of Options::features. InvalidArgument where that is nothing.
+  /// Sets the features tested between the two meshes, instead of Options::features. Throws InvalidArgument if none is
+  /// set.
   void set_features(std::uint32_t mesh_a, std::uint32_t mesh_b, TestedFeatures features);
 
+  /// A mesh, and the place of its vertices, faces and edges in the scene-wide arrays.
   struct Mesh {
     std::string name;
     MeshOptions options;
     std::uint32_t first_vertex, n_vertices, first_face, n_faces;
     std::uint32_t first_edge, n_edges;  ///< in edges()
   };
+  /// All meshes, in the order added.
   const std::vector<Mesh>& meshes() const { return meshes_; }
-  /// Vertices of each triangle of all meshes, as numbered in the scene.
+  /// Vertices of the triangles of all meshes, scene-wide indices.
   const std::vector<std::array<std::uint32_t, 3>>& faces() const { return faces_; }
-  /// Ends of each edge that was given, of all meshes, as numbered in the scene.
+  /// Vertices of the edges that were given to add_mesh, scene-wide indices.
   const std::vector<std::array<std::uint32_t, 2>>& edges() const { return edges_; }
+  /// Number of vertices of all meshes.
   std::uint32_t n_vertices() const { return n_vertices_; }
 
-  // What was set of a pair, or what holds otherwise. Numbers are not checked here.
+  // The value that is set for a pair of meshes, or `otherwise`. Mesh numbers are not checked.
   bool pair_enabled(std::uint32_t mesh_a, std::uint32_t mesh_b) const;
   Accuracy pair_accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b, Accuracy otherwise) const;
   double pair_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double otherwise) const;

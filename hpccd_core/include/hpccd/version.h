@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The version of these headers. CMake and the Python wheel read it here, so that it is written once for the core.
+// The version of the headers. CMake and the Python wheel read it from this file.
 #pragma once
 
 #include "hpccd/export.h"
@@ -12,8 +12,8 @@
 namespace hpccd {
 inline namespace v0_1 {
 
-/// The version of the library that is linked, such as "0.1.0"; HPCCD_VERSION is that of the headers. Never null. From
-/// any thread.
+/// The version of the linked library, such as "0.1.0", never null. HPCCD_VERSION is the version of the headers.
+/// Thread-safe.
 HPCCD_API const char* version();
 
 }  // namespace v0_1
