@@ -17,10 +17,11 @@ namespace hpccd {
 inline namespace v0_1 {
 
 /// Accuracy tiers and their promises:
-///   exact         contacts as rational arithmetic on the given coordinates decides; times within 1e-12
-///   conservative  no false negatives; no time later than the true one
-///   balanced      double precision; errors only within about 1e-12 of a border
-///   fast          single precision; no promise, errors of times mostly below 1e-3 of the step
+///
+/// - exact: contacts as rational arithmetic on the given coordinates decides; times within 1e-12
+/// - conservative: no false negatives; no time later than the true one
+/// - balanced: double precision; errors only within about 1e-12 of a border
+/// - fast: single precision; no promise, errors of times mostly below 1e-3 of the step
 enum class Accuracy : std::uint8_t { fast, balanced, conservative, exact };
 
 /// Pairs of features that are tested. At least one must be set; to test nothing between two meshes, use
@@ -53,9 +54,12 @@ class HPCCD_API Scene {
  public:
   /// Adds a mesh and returns its number.
   ///
-  /// The name must be unique. faces has 3 indices per triangle, edges 2 per edge, into this mesh's own vertices, from 0
-  /// to n_vertices - 1. edges are those that belong to no triangle, as of a rope. An edge that is given twice, or that
-  /// also belongs to a triangle, counts once; an edge from a vertex to itself is ignored.
+  /// - name: unique in the scene
+  /// - faces: 3 indices per triangle into this mesh's own vertices, from 0 to n_vertices - 1
+  /// - n_vertices: number of vertices of this mesh
+  /// - options: self-collision, static
+  /// - edges: 2 indices per edge, for edges that belong to no triangle, as of a rope. An edge that is given twice, or
+  ///   that also belongs to a triangle, counts once; an edge from a vertex to itself is ignored.
   ///
   /// Throws InvalidArgument if the name is taken, if a length is not a multiple of 3 (or 2), if an index is out of
   /// range, or if the scene would have more than 2^32 - 2 vertices. On any exception the scene is unchanged.
