@@ -45,7 +45,7 @@ INSTALLED   := $(VENV)/.hpccd-installed
 SOURCES := $(sort $(shell find CMakeLists.txt setup.py package.xml action cmake config launch msg srv scripts hpccd_ros hpccd_core \
   \( -name __pycache__ -o -name dist -o -path hpccd_core/tests \) -prune -o -type f -print))
 
-.PHONY: help venv demo bench test test-core test-python test-long test-gpu test-aarch64 sanitize fuzz oracle lint format release-check pin clean distclean \
+.PHONY: help venv demo bench test test-core test-python test-long test-gpu test-aarch64 sanitize fuzz oracle docs lint format release-check pin clean distclean \
   FORCE
 
 help: ## Show this list
@@ -99,6 +99,15 @@ bench: venv oracle ## Measure one subject (BENCH_ARGS="scaling"; without it, a l
 
 fuzz: venv oracle ## Compare the core with the exact oracle on random and degenerate queries (FUZZ_ARGS=--help)
 	PYTHONPATH=test:build/oracle $(BIN)/python -m fuzz $(FUZZ_ARGS)
+
+docs: $(INSTALLED) $(VENV)/.hpccd-docs ## Build the site of the documentation in build/site
+	$(BIN)/sphinx-build --fail-on-warning --keep-going --quiet --jobs $(JOBS) docs build/site
+	@echo "hpccd: open build/site/index.html"
+
+# Sphinx is not part of the environment: make demo would install it for nothing.
+$(VENV)/.hpccd-docs: $(ENVIRONMENT)
+	@bash scripts/create_venv.sh $(VENV) $(EXTRAS) docs
+	@touch $@
 
 oracle: $(ENVIRONMENT) ## Build the exact oracle that tests and fuzzer compare with
 	@mkdir -p build; . $(VENV)/build.env; { cmake -S test/oracle -B build/oracle -G Ninja \
