@@ -14,6 +14,9 @@ from hpccd_ros.base.errors import UserError
 
 COMMANDS = {
     "demo": "see it work: node, moving scene and recorder as separate processes, then a picture",
+    "status": "ask a running node how it is: state, rates, what was rejected, what is wrong",
+    "echo": "print the messages of a topic",
+    "param": "read and set the parameters of a running node",
     "record": "record the meshes and contacts of a running node into an MCAP file",
     "replay": "compute a recording again and verify its contacts, or play it over DDS",
     "view": "draw recorded frames: shaded meshes with their contacts",
@@ -25,7 +28,7 @@ COMMANDS = {
 }
 
 # Those that load rcl whatever their options.
-NEED_ROS = ("cut", "demo", "record", "replay", "view")
+NEED_ROS = ("cut", "demo", "echo", "param", "record", "replay", "status", "view")
 
 EPILOG = """\
 a first tour:

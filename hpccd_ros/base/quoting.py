@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What users and strangers sent, quoted in messages: short enough to be read, whatever its length."""
 
+import difflib
 from collections import Counter
 from collections.abc import Iterable
 
@@ -36,6 +37,17 @@ def listed(names: Iterable[str]) -> str:
 def repeated(names: Iterable[str]) -> str:
     """The name that is there most often."""
     return quoted(Counter(names).most_common(1)[0][0])
+
+
+def suggestion(word: str, names: Iterable[str]) -> str:
+    """ "; did you mean NAME?" with the name nearest to ``word``; "": none is near."""
+    near = difflib.get_close_matches(word, list(names), n=1)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
+def counted(count: int, one: str, many: str = "") -> str:
+    """``1 frame``, ``2 frames``; many: the plural where it is not ``one`` with an s."""
+    return f"{count:,} {one if count == 1 else many or f'{one}s'}"
 
 
 def printable(text: str) -> str:

@@ -188,6 +188,7 @@ class PositionsSubscription(MeshTopic):
             self.taken(sent, False)  # listed, because a replay reads and refuses it too
             of.accounts.refused(error.refusal(of.mesh, aspect=self.aspect, sent=sent))
             return
+        of.accounts.metrics.stamped(of.mesh, frame.stamp)
         new_publisher = self.numbers.notice()
         self.taken(sent, new_publisher, not alone)
         hand_over(of.pipeline.push(of.mesh, frame, new_publisher), of.pipeline, of.accounts)

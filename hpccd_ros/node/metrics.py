@@ -17,6 +17,7 @@ class Metrics:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self.received: dict[str, int] = {}
+        self.last_stamps: dict[str, int] = {}  # ns, of the last message of a mesh or topic that could be read
         self.answered = 0
         self.detections = 0
         self.first_frames = 0
@@ -38,6 +39,11 @@ class Metrics:
             self.received[mesh] = self.received.get(mesh, 0) + messages
             if transport_ms is not None:
                 self._transport_ms.append(transport_ms)
+
+    def stamped(self, name: str, stamp: int) -> None:
+        """A message of mesh or topic ``name`` was read."""
+        with self._lock:
+            self.last_stamps[name] = stamp
 
     def first_frame(self, messages: int) -> None:
         """A frame of ``messages`` vertex messages was only the start of the next step."""
@@ -84,6 +90,7 @@ class Metrics:
         with self._lock:
             return {
                 "received": dict(self.received),
+                "last_stamps": dict(self.last_stamps),
                 "answered": self.answered,
                 "detections": self.detections,
                 "first_frames": self.first_frames,

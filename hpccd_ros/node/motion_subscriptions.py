@@ -92,6 +92,8 @@ class JointSubscriptions:
                 self._refuse([Refusal(topic, Reason.RATE, text, what=Input.JOINT_STATE, sent=sent)])
                 return
             self._accounts.inputs.add(topic, sent)
+            stamp = message.header.stamp
+            self._accounts.metrics.stamped(topic, stamp.sec * 10**9 + stamp.nanosec)
             moved = [self._of_robots[robot] for robot in robots if robot in self._of_robots]
             refusals = joint_messages.fill(moved, message, topic, sent, publisher)
             if (kept := joint_messages.kept(message)) is not None:

@@ -75,6 +75,7 @@ class Reporter:
         for mesh, count in sorted(data["received"].items()):
             values[f"received.{mesh}"] = count
             values[f"rate_hz.{mesh}"] = f"{(count - self._received.get(mesh, 0)) / period:.2f}"
+        values |= {f"last_stamp.{name}": stamp for name, stamp in sorted(data["last_stamps"].items())}
         came = sum(data["received"].values()) - sum(self._received.values())
         values |= {
             "received": sum(data["received"].values()),
@@ -96,6 +97,7 @@ class Reporter:
         for stage, text in percentiles(data["transport_ms"]).items():
             values[f"transport_ms.{stage}"] = text
         values["last_refusal"] = accounts.log.last
+        values |= {f"warning.{number}": text for number, text in enumerate(warnings, start=1)}
         self._received, self._dropped, self._topologies_refused = (data["received"], dropped, topologies_refused)
         notes = list(warnings)
         if new:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All parameters of a node as plain values: of one in this process, or of a running one over its services."""
+"""All parameters of a node as plain values: of one in this process, or of a running one over its services.
+
+`call` asks any service of another node, in bounded time."""
 
 import functools
 import time
@@ -10,6 +12,7 @@ from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python
 
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.middleware import graph
 
 # s; twice as long each time, as a slow node would be flooded. A response is lost if the node discovers the client only
 # after it has answered. Once a client has received one, no later one is lost for that reason.
@@ -28,12 +31,12 @@ def fetch(node, remote: str, wait: float, stop: Sequence = ()) -> dict:
     KeyboardInterrupt once there is something in `stop`, which a signal's handler may see to.
     """
     deadline = time.monotonic() + wait
-    call = functools.partial(_call, node, deadline=deadline, remote=remote, stop=stop)
-    names = call(ListParameters, f"{remote}/list_parameters", [ListParameters.Request()])
+    ask = functools.partial(call, node, deadline=deadline, remote=remote, stop=stop)
+    names = ask(ListParameters, f"{remote}/list_parameters", [ListParameters.Request()])
     # One request for each: a node answers a request for several with nothing if one of them was never set.
     wanted = sorted(names[0].result.names)
     requests = [GetParameters.Request(names=[name]) for name in wanted]
-    answers = call(GetParameters, f"{remote}/get_parameters", requests)
+    answers = ask(GetParameters, f"{remote}/get_parameters", requests)
     return {
         name: _plain(parameter_value_to_python(answer.values[0]))
         for name, answer in zip(wanted, answers, strict=True)
@@ -41,12 +44,14 @@ def fetch(node, remote: str, wait: float, stop: Sequence = ()) -> dict:
     }
 
 
-def _call(node, service, name, requests, *, deadline, remote, stop):
+def call(node, service, name, requests, *, deadline, remote, stop=()):
+    """The responses of the service ``name`` of the node ``remote`` to ``requests``, one after the other. deadline: in
+    time.monotonic(), for the service to appear. Raises as `fetch`."""
     client = node.create_client(service, name)
     try:
         while not client.service_is_ready():
             if time.monotonic() > deadline:
-                raise UserError(f"no node {remote} found{_nodes(node)}: start it, name another with --node, or --wait")
+                raise UserError(graph.no_node(node, "start it, name another, or wait longer (--wait)", remote))
             _spin_once(node, stop)
         results = []
         for request in requests:  # one after the other: the queue of a service holds ten
@@ -74,14 +79,6 @@ def _spin_once(node, stop) -> None:
     if stop:
         raise KeyboardInterrupt
     rclpy.spin_once(node, timeout_sec=0.05)
-
-
-def _nodes(node) -> str:
-    own = (node.get_name(), node.get_namespace())
-    others = sorted(
-        {f"{ns.rstrip('/')}/{name}" for name, ns in node.get_node_names_and_namespaces() if (name, ns) != own}
-    )
-    return f" (there are: {', '.join(others)})" if others else " (no other node is running)"
 
 
 def _plain(value):

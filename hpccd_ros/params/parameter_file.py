@@ -36,6 +36,22 @@ def read_parameters(path) -> dict[str, Any]:
     return flat
 
 
+def value(text: str) -> Any:
+    """What a parameter is given by ``text``, as ROS reads it: YAML, or the text itself where that has no such value."""
+    try:
+        found = yaml.load(text, _Loader)
+    except (yaml.YAMLError, ValueError, RecursionError):
+        return text
+    entries = found if isinstance(found, list) else [found]
+    if not all(isinstance(entry, (bool, int, float, str)) for entry in entries):
+        return text
+    if not entries:
+        return [""]  # an empty list has no type in ROS
+    if {type(entry) for entry in entries} == {int, float}:
+        return [float(entry) for entry in entries]
+    return found if len({type(entry) for entry in entries}) == 1 else text
+
+
 def _text(path: Path) -> str:
     if path.exists() and not path.is_file():
         raise ValueError("no file")

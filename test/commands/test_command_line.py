@@ -11,6 +11,8 @@ from sources import ROOT
 
 from hpccd_ros import cli
 
+ASKING = ("status", "echo", "param")  # a running node
+
 
 @pytest.mark.parametrize("command", cli.COMMANDS)
 def test_every_command_has_help_with_examples(command, capsys):
@@ -25,7 +27,7 @@ def test_the_list_of_commands(capsys):
     with pytest.raises(SystemExit):
         cli.main(["--help"])
     shown = capsys.readouterr().out
-    for command in ("demo", "record", "replay", "view", "cut", "doctor", "scene", "bench", "info"):
+    for command in ("demo", "record", "replay", "view", "cut", "doctor", "scene", "bench", "info", *ASKING):
         assert f"    {command} " in shown
 
 
@@ -66,6 +68,10 @@ def test_help_imports_neither_ros_nor_the_core():
         (["cut", "x.mcap", "--to", "1", "-o", "y"], "-o y: must end in .mcap"),
         (["cut", "x.mcap", "--to", "-1", "-o", "y.mcap"], "--to: '-1' is not a time; give seconds from the beginning"),
         (["cut", "x.mcap", "--from", "1", "-o", "y.mcap"], "x.mcap does not exist"),
+        (["status", "--wait", "-1"], "--wait -1.0: must be a number of seconds, not negative"),
+        (["echo", "/contacts", "--wait", "nan"], "--wait nan: must be a number of seconds"),
+        (["echo", "/contacts", "-n", "0"], "-n 0: must be at least 1"),
+        (["param", "get"], "get: got no NAME; write hpccd param get NAME"),
         (["demo", "--rate", "0"], "--rate 0.0: must be above 0"),
         (["demo", "--out", "/dev/null/out"], "--out /dev/null/out: Not a directory"),
         (["demo", "--scene", "nothing"], "unknown scene 'nothing'"),
@@ -90,6 +96,9 @@ def test_unknown_command(hpccd):
         ["view", "x.mcap"],
         ["cut", "x.mcap", "-o", "y.mcap"],
         ["record"],
+        ["status"],
+        ["echo", "/contacts"],
+        ["param", "list"],
         ["scene", "two-triangles", "--publish"],
     ],
 )

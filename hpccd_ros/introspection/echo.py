@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`hpccd echo`: print the messages of a topic."""
+
+import sys
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import rclpy
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from rclpy.subscription import Subscription
+
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import counted, listed, quoted, suggestion
+from hpccd_ros.introspection import message_text, peer
+from hpccd_ros.middleware import graph, qos
+from hpccd_ros.middleware.message_types import message_class
+
+# Messages that may wait to be printed.
+_DEPTH = 100
+# s between two looks at what the publishers offer.
+_LOOK_EVERY = 0.2
+# s without a message, after which it is said that none has come.
+_QUIET = 3.0
+
+
+def main(args) -> int:
+    """Print messages until as many as ``args`` asks for have come, or until SIGINT or SIGTERM."""
+    with peer.peer("echo") as (node, stop):
+        topic = _resolved(node, args.topic)
+        type_name = _type(node, topic, args.wait, stop)
+        try:
+            message_type = message_class(type_name)
+        except LookupError as error:
+            raise UserError(f"{topic}: {error}; install the package of this message type") from error
+        _Printer(node, topic, message_type, args).run(stop)
+    return 0
+
+
+def _resolved(node: Node, topic: str) -> str:
+    try:
+        return node.resolve_topic_name(topic)
+    except (InvalidTopicNameException, RuntimeError) as error:  # RuntimeError: rclpy's, of a name that is too long
+        raise UserError(
+            f"{quoted(topic)}: not a topic name; write it as /contacts or /meshes/cloth/vertices"
+        ) from error
+
+
+def _type(node: Node, topic: str, wait: float, stop: Sequence) -> str:
+    deadline = time.monotonic() + wait
+    while topic not in (found := dict(node.get_topic_names_and_types())):
+        if time.monotonic() > deadline:
+            names = [name for name in found if not name.startswith(("/rosout", "/parameter_events"))]
+            there = f" (there are: {listed(names)})" if names else ""
+            raise UserError(
+                f"{topic}: no such topic on {graph.domain()}{there}; start its publisher, or {graph.elsewhere()}"
+                f"{suggestion(topic, names)}"
+            )
+        _wait(node, stop)
+    offered = {publisher.topic_type for publisher in node.get_publishers_info_by_topic(topic)}
+    types = sorted(offered) or found[topic]
+    if len(types) > 1:
+        raise UserError(
+            f"{topic}: it has publishers of several types ({listed(types)}); stop the publishers of the wrong type"
+        )
+    return types[0]
+
+
+class _Printer:
+    """Asks for what the publishers offer, now and later: DDS does not connect a publisher that offers less."""
+
+    def __init__(self, node: Node, topic: str, message_type: type, args) -> None:
+        self._node = node
+        self._topic = topic
+        self._message_type = message_type
+        self._args = args
+        self._waiting: list[Any] = []
+        self._asked: tuple[bool, bool] | None = None
+        self._subscription: Subscription | None = None
+
+    def run(self, stop: Sequence) -> None:
+        printed, quiet_at, look = 0, time.monotonic() + _QUIET, 0.0
+        while not stop:
+            if time.monotonic() >= look:
+                look = time.monotonic() + _LOOK_EVERY
+                self._subscribe()
+            rclpy.spin_once(self._node, timeout_sec=0.1)
+            for message in self._waiting:
+                print("\n".join(message_text.lines(message, self._args.full)), "---", sep="\n", flush=True)
+                printed += 1
+                if printed == self._args.count:
+                    return
+            self._waiting.clear()
+            if not printed and time.monotonic() > quiet_at:
+                quiet_at = float("inf")
+                publishers = counted(self._node.count_publishers(self._topic), "publisher")
+                print(f"{self._topic}: no message yet; it has {publishers}; Ctrl-C ends", file=sys.stderr, flush=True)
+
+    def _subscribe(self) -> None:
+        offers = [publisher.qos_profile for publisher in self._node.get_publishers_info_by_topic(self._topic)]
+        reliable = all(offer.reliability == ReliabilityPolicy.RELIABLE for offer in offers)
+        latched = all(offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
+        if not offers or (reliable, latched) == self._asked:
+            return
+        if self._subscription is not None:
+            self._node.destroy_subscription(self._subscription)
+        profile = qos.keep_last(_DEPTH, reliable=reliable, latched=latched)
+        self._subscription = self._node.create_subscription(
+            self._message_type, self._topic, self._waiting.append, profile
+        )
+        self._asked = reliable, latched
+
+
+def _wait(node: Node, stop: Sequence) -> None:
+    if stop:
+        raise KeyboardInterrupt
+    rclpy.spin_once(node, timeout_sec=0.02)

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The graph of nodes and topics, as discovery knows it in this process."""
+
+import os
+from typing import Any
+
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.node import Node, NodeNameNonExistentError
+
+from hpccd_ros.base.quoting import listed, shortened, suggestion
+from hpccd_ros.middleware import environment
+
+_DETECT = "hpccd/srv/Detect"
+_GET_STATE = "lifecycle_msgs/srv/GetState"
+
+
+def full_name(name: str, namespace: str) -> str:
+    """Of a node."""
+    return f"{namespace.rstrip('/')}/{name}"
+
+
+def other_nodes(node: Node) -> list[str]:
+    """Full names of all nodes but ``node`` and hidden ones, whose name begins with an underscore."""
+    own = (node.get_name(), node.get_namespace())
+    found = node.get_node_names_and_namespaces()
+    return sorted({full_name(*one) for one in found if one != own and not one[0].startswith("_")})
+
+
+def services(node: Node, name: str, namespace: str) -> dict[str, list[str]]:
+    """Service -> its types, of a node; none where the node has gone, is not known yet, or is not a ROS node."""
+    try:
+        return dict(node.get_service_names_and_types_by_node(name, namespace))
+    except (NodeNameNonExistentError, RCLError):
+        return {}
+
+
+def detects(node: Node, name: str, namespace: str) -> bool:
+    """Whether a node has a service of type hpccd/srv/Detect, as each configured hpccd node does."""
+    return any(_DETECT in types for types in services(node, name, namespace).values())
+
+
+def has_life_cycle(node: Node, name: str, namespace: str) -> bool:
+    """Whether a node has the life-cycle services."""
+    return _GET_STATE in services(node, name, namespace).get(f"{full_name(name, namespace)}/get_state", ())
+
+
+def endpoint_node(endpoint: Any) -> str:
+    """In words, the node of a publisher or subscription."""
+    if endpoint.node_name == "_NODE_NAME_UNKNOWN_":  # ROS discovers nodes after their publishers
+        return "whose node is not known yet"
+    if endpoint.node_name == "_CREATED_BY_BARE_DDS_APP_":
+        return "that is not a ROS node"
+    return f"of node {shortened(full_name(endpoint.node_name, endpoint.node_namespace))}"
+
+
+def no_node(node: Node, remedy: str, wanted: str = "") -> str:
+    """That no node ``wanted`` (full name; "": no hpccd node) is found, which others there are, and the remedy."""
+    others = other_nodes(node)
+    there = f" (there are: {listed(others)})" if others else " (no other node is running)"
+    near = suggestion(wanted, others) if wanted else ""
+    return f"no {f'node {wanted}' if wanted else 'hpccd node'} found on {domain()}{there}; {remedy}{near}"
+
+
+def domain() -> str:
+    """The DDS domain of this process, in words."""
+    return f"ROS_DOMAIN_ID {os.environ.get('ROS_DOMAIN_ID') or 0}"
+
+
+def elsewhere() -> str:
+    """How to reach a node on another domain or machine."""
+    beyond = f", and {environment.DISCOVERY}=SUBNET if it is on another machine" if environment.this_host_only() else ""
+    return f"set ROS_DOMAIN_ID to that of the node{beyond}"

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`hpccd status` of real nodes."""
+
+import json
+import os
+
+import pytest
+from waving_sheet import sheet_faces, sheet_positions
+
+N = 8
+
+
+@pytest.fixture
+def empty_domain(monkeypatch):
+    """A ROS_DOMAIN_ID that the tests do not use otherwise."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", "101")
+    return 101
+
+
+def of(done):
+    """The one node in the JSON that was printed."""
+    (found,) = json.loads(done.stdout)
+    return found
+
+
+def test_a_node_that_answers(start_node, hpccd):
+    node = start_node({"meshes": ["cloth", "floor"], "mesh.floor.static": True, "stop_distance": 0.0})
+    for mesh in ("cloth", "floor"):
+        node.peer.topology(mesh, sheet_faces(N), N * N)
+    node.peer.vertices("floor", sheet_positions(N, 0) - [0, 0, 5], 0)
+    node.frames_status(answered=1)
+    for k in range(3):
+        node.peer.vertices("cloth", sheet_positions(N, k), 1_500_000_000 + k)
+        node.contacts(k)
+    name = f"{node.namespace}/hpccd"
+    shown = hpccd("status", name)
+    lines = shown.stdout.splitlines()
+    assert lines[0] == f"{name}: active"
+    assert any(
+        line.startswith("  cloth  ") and "last stamp 1.500000002 s, 3 messages received" in line for line in lines
+    ), shown.stdout
+    assert any(line.startswith("  floor  static, last stamp 0.000000000 s, 1 message received") for line in lines)
+    assert any(line.startswith("  answers: ") and " 2 in all; latency " in line for line in lines)
+    assert any(line.startswith("  stop: ") for line in lines)
+    found = of(hpccd("status", name, "--json"))
+    assert (found["state"], found["answers"], found["dropped"]) == ("active", 2, 0)
+    assert found["meshes"]["cloth"]["last_stamp_ns"] == 1_500_000_002
+    assert found["meshes"]["floor"]["static"] and found["stop"]["text"].startswith(("true: ", "false: "))
+
+
+def test_what_is_wrong_is_said(start_node, hpccd):
+    node = start_node({"meshes": ["cloth"], "pending_frames": 1})
+    for k in range(3):
+        node.peer.vertices("cloth", sheet_positions(N, k), k)
+    node.peer.vertices("clot", sheet_positions(N, 0), 0)
+    node.wait_until(lambda: "clot/vertices" in node.peer.statuses["frames"][1], "the warning")
+    done = hpccd("status", node.namespace.lstrip("/") + "/hpccd")
+    assert done.returncode == 1, done.stdout
+    assert "  dropped: " in done.stdout and "no_topology " in done.stdout
+    assert "  last rejection: cloth: no_topology: topology" in done.stdout
+    assert f"  wrong: {node.namespace}/meshes/clot/vertices belongs to no mesh" in done.stdout
+
+
+def test_a_node_that_is_not_configured(start_node, hpccd):
+    node = start_node({"meshes": ["cloth"], "autostart": False}, wait=False)
+    done = hpccd("status", "--wait", "60", f"{node.namespace}/hpccd")
+    assert done.returncode == 1 and done.stdout.startswith(f"{node.namespace}/hpccd: unconfigured\n")
+    assert "  wrong: the node is unconfigured, so it detects nothing; configure and activate it" in done.stdout
+    everywhere = hpccd("status", "--json")
+    assert f"{node.namespace}/hpccd" in [one["node"] for one in json.loads(everywhere.stdout)]
+
+
+def test_no_node(hpccd, empty_domain):
+    done = hpccd("status", "--wait", "0.3")
+    assert done.returncode == 2 and done.stdout == ""
+    assert "no hpccd node found on ROS_DOMAIN_ID 101 (no other node is running); start one (hpccd_node" in done.stderr
+    assert "set ROS_DOMAIN_ID to that of the node, and ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET" in done.stderr
+
+
+def test_a_wrong_name_of_a_node(start_node, hpccd):
+    node = start_node({"meshes": ["cloth"]})
+    done = hpccd("status", f"{node.namespace}/hpcd", "--wait", "0.5")
+    assert done.returncode == 2
+    assert f"no node {node.namespace}/hpcd found on ROS_DOMAIN_ID {os.environ['ROS_DOMAIN_ID']}" in done.stderr
+    assert f"did you mean {node.namespace}/hpccd?" in done.stderr
