@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// pybind11 only, no logic: arguments were checked in Python. The interpreter lock is released during work.
+// pybind11 code without logic: Python has checked the arguments. The interpreter lock is released during work.
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>

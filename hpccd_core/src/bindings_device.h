@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Results that stay on a device, for Python.
+// Python bindings of results that stay on a device.
 #pragma once
 
 #include <pybind11/pybind11.h>

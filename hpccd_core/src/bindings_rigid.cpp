@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is done for the joints of a robot takes microseconds, less than to get the interpreter lock back: it is kept,
-// but for many vertices.
+// Computations for the joints of a robot take microseconds, less than reacquiring the interpreter lock: the lock is
+// kept, except for many vertices.
 #include "bindings_rigid.h"
 
 #include <pybind11/numpy.h>

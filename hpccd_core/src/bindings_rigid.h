@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Chains of joints, for Python.
+// Python bindings of chains of joints.
 #pragma once
 
 #include <pybind11/pybind11.h>

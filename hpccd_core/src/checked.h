@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a Detector is given, before anything is made of it.
+// Checks the inputs of a Detector before they are used.
 #pragma once
 
 #include <memory>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks what it is given, picks where a step is computed, and falls back to the CPU where that fails.
+// Checks the inputs, selects the backend, and falls back to the CPU if that backend fails.
 #include <algorithm>
 #include <atomic>
 #include <memory>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The backends of one detector: what its options allow and this machine has.
+// The backends of one detector: those that its options allow and this machine has.
 #pragma once
 
 #include <map>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the detector asks of each place where a step can be computed. Positions are those of all its worlds, one world
-// after the other, and so are the answers, with their slices where there are several. A backend of one world takes
-// those of one; WorldByWorld makes of it one of many.
+// The interface of a backend: a place where a step can be computed. Positions are those of all worlds, one world after
+// the other, and so are the results, with their slices if there are several worlds. A backend for one world takes the
+// positions of one; WorldByWorld turns it into a backend for many.
 #pragma once
 
 #include <map>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A step on CPU threads. Its parts are there for the hybrid too, whose devices take the tests off the same threads.
+// Computes a step on CPU threads. Its parts are shared with the hybrid backend, whose devices take over the tests.
 #pragma once
 
 #include <memory>

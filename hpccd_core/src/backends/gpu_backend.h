@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A whole step on one GPU; the CPU's exact fallback beside it.
+// Computes a whole step on one GPU, with the CPU's exact fallback for undecided pairs.
 #pragma once
 
 #include <compare>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The public result of a step on the GPU: what the device found, sorted and hashed, with what the CPU decided for it.
+// The public result of a step on the GPU: the contacts of the device, sorted and hashed, together with those that the
+// CPU decided.
 #pragma once
 
 #include <optional>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A step on CPU threads and this machine's GPUs together (Kim et al. 2009, section 5): bounds, hierarchy and traversal
-// are the CPU backend's, which leaves pairs of leaves to the devices.
+// Computes a step on CPU threads and this machine's GPUs together (Kim et al. 2009, section 5): bounds, hierarchy and
+// traversal are those of the CPU backend; pairs of leaves are tested on the devices.
 #pragma once
 
 #include <memory>

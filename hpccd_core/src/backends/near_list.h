@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// All pairs of features that are near each other in one snapshot, kept for the motions that begin there or close by (a
-// list of neighbours as molecular dynamics keeps: Verlet 1967). While no vertex is farther from where it was in that
-// snapshot than the list's radius, no other pair touches: features move no farther than their vertices.
+// All pairs of features that are near each other in one snapshot, kept for motions that start there or close by (like
+// the neighbour lists of molecular dynamics: Verlet 1967). While no vertex is farther from its position in the
+// snapshot than the list's radius, no other pair can touch: features move no farther than their vertices.
 #pragma once
 
 #include <algorithm>

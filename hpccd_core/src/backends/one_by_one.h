@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Many worlds by a backend of one, one after the other: for devices that take one at a time.
+// Computes many worlds one after the other with a backend for one world, for devices that process one at a time.
 #pragma once
 
 #include <map>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the backends of one detector share, so that each step can go to another one.
+// Resources that the backends of one detector share, so that each step can use another backend.
 #pragma once
 
 #include <memory>

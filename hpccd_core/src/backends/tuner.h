@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The choice of backend "auto": the first steps go to each in turn, the rest to the fastest.
+// Selects the backend for "auto": the first steps use each backend in turn, the rest the fastest one.
 #pragma once
 
 #include <limits>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the workers of one query counted, or those of several: numbers alone, as they are added up for each world.
+// Counts of the work of one query, per worker or in total. Plain numbers, since they are added up over worlds.
 #pragma once
 
 #include <cstdint>

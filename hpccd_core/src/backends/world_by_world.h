@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A backend of many worlds made of backends of one: each world is asked for by itself, and the answers are joined.
+// A backend for many worlds made of backends for one: each world is computed by itself, and the results are
+// concatenated.
 #pragma once
 
 #include <functional>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the motions of one world among many leave for its next one; all else lasts a call, and is a thread's.
+// Data of one world that is kept from one motion to the next. All other data lasts one call and belongs to a thread.
 #pragma once
 
 #include "backends/moving_tree.h"

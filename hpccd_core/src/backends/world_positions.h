@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One world among many: its part of all positions, and its name in what is said of it.
+// One world of many: its part of all positions, and its name in messages.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Many worlds on CPU threads, each by one thread. What a step needs is the thread's, and stays in its core's cache; of
-// a world only little is kept from call to call (world_memory.h).
+// Many worlds on CPU threads, one thread per world. The data of a step belongs to the thread and stays in the cache of
+// its core; little is kept per world from call to call (world_memory.h).
 #pragma once
 
 #include <memory>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Zero bits at the ends of a number. std::countl_zero and std::countr_zero compile for GPUs and give 64 there, whatever
-// the number (nvcc 13.0).
+// Counts zero bits at the ends of a number. std::countl_zero and std::countr_zero compile for GPUs but return 64 there
+// for every number (nvcc 13.0).
 #pragma once
 
 #include <bit>

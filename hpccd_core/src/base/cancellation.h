@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A request that ends work under way, from any thread. Those who work look at it between pieces that take a moment: a
-// look is one load of what hardly ever changes.
+// A request, from any thread, that ends running work. Workers check it between short pieces of work: a check is one
+// load of a value that hardly ever changes.
 #pragma once
 
 #include <algorithm>

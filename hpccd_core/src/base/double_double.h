@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A real number as the sum of two doubles, 106 bits (Dekker 1971; algorithms and bounds of Joldes, Muller and Popescu,
-// "Tight and rigorous error bounds for basic building blocks of double-word arithmetic", 2017). Only +, -, *, fma: the
-// same bits on every machine.
+// "Tight and rigorous error bounds for basic building blocks of double-word arithmetic", 2017). Uses only +, -, *,
+// fma, so it is bit-identical on every machine.
 #pragma once
 
 #include "base/real.h"

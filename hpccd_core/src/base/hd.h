@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Marks the arithmetic that the CPU's lanes and the GPU's threads share.
+// Marks arithmetic that is compiled for both CPU lanes and GPU threads.
 #pragma once
 
 #if defined(__CUDACC__)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lengths that callers give: separations and distances.
+// Lengths given by the caller: separations and distances.
 #pragma once
 
 #include <charconv>

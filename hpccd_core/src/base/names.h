@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options that are one of several names: what comes from a file or another language may be any number.
+// Options with several names. A value from a file or another language may be any number.
 #pragma once
 
 #include <string>

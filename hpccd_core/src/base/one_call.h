@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One call at a time, on whatever thread: a lock for std::lock_guard. It says of which process its holder is, in the
-// same word: a child made by fork() can tell that it was held by a thread which the child does not have.
+// Allows one call at a time, on any thread: a lock for std::lock_guard. The lock word also holds the process of its
+// holder, so that a child made by fork() can detect that the lock was held by a thread that the child does not have.
 #pragma once
 
 #include <atomic>

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A pool of threads and a parallel loop over it. Between the jobs of one call threads wait actively for a moment, since
-// waking a sleeping one (about 50 us) costs more than many jobs take; between calls they sleep, on a futex each side
-// (std::atomic::wait): a condition variable's mutex would put those that wake together to sleep again (spin_lock.h).
+// A pool of threads and a parallel loop over it. Between the jobs of one call threads spin briefly, since waking a
+// sleeping thread (about 50 us) costs more than many jobs take. Between calls they sleep on one futex per side
+// (std::atomic::wait): the mutex of a condition variable would put threads that wake together to sleep again
+// (spin_lock.h).
 #pragma once
 
 #include <atomic>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Wall-clock time of the stages of one call. What no stage accounts for is the remainder, shown as "other".
+// Wall-clock time of the stages of one call. The time outside all stages is the remainder, reported as "other".
 #pragma once
 
 #include <chrono>

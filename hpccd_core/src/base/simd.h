@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The instruction sets of this machine.
+// The instruction sets that this machine supports.
 #pragma once
 
 #include "hpccd/hpccd.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The floating-point mode that all error bounds assume: rounding to nearest, denormal numbers kept, no traps.
-// Other libraries may set another mode in the threads that call this one, for their own speed (loading a library that
-// was compiled with -ffast-math sets flush-to-zero).
+// The floating-point mode that all error bounds assume: rounding to nearest, denormal numbers kept, no traps. Other
+// libraries may set another mode in the calling threads for speed (loading a library that was compiled with
+// -ffast-math sets flush-to-zero).
 #pragma once
 
 #include <cfenv>

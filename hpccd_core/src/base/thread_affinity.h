@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Threads on a core each. Of threads that are woken together Linux puts two on one core, though another is idle, and
-// leaves them there for a time slice: on four cores 369 wake-ups in 400 after a pause of 5 ms, and 0.8 ms for a job of
-// 0.3. So each is woken on a core of its own; and one that runs on another's is moved. Either is free to be moved again
-// once the job has begun: cores are shared with other processes, whose load the kernel knows.
+// Places threads on one core each. Linux puts two threads that are woken together on the same core, although another
+// is idle, and leaves them there for a time slice: on four cores 369 of 400 wake-ups after a pause of 5 ms, at 0.8 ms
+// for a job of 0.3. Therefore each thread is woken on a core of its own, and one that runs on another's core is moved.
+// Both may be moved again once the job has begun: cores are shared with other processes, whose load the kernel knows.
 #pragma once
 
 #include <atomic>

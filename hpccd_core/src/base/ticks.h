@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The processor's own clock: a look takes 10 ns and calls nothing, so that kernels of any instruction set may look.
-// Only ratios of differences mean something. 0 where there is no such clock.
+// The processor's own clock. A reading takes 10 ns and calls no function, so kernels of any instruction set may use
+// it. Only ratios of differences are meaningful. 0 if the machine has no such clock.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Centres and scales coordinates before they become floats, so that boxes stay sharp far from the origin and at any
-// scale. Subtraction, multiplication by a power of two and rounding to float all keep the order of numbers (x <= y
-// implies map(x) <= map(y)), which is all that culling needs to be safe.
+// Centres and scales coordinates before they are rounded to floats, so that boxes stay tight far from the origin and
+// at any scale. Subtraction, multiplication by a power of two and rounding to float are monotonic (x <= y implies
+// map(x) <= map(y)). Culling needs no more than that to be safe.
 #pragma once
 
 #include <math.h>

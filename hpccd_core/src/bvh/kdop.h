@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bounds of a motion along eight more directions than the axes (k-DOPs, Klosowski et al. 1998), at both of its ends:
-// features in the same order along one of them at t = 0 and at t = 1 are apart throughout (motion_box.h).
+// Bounds of a motion along eight more directions than the axes (k-DOPs, Klosowski et al. 1998), at both of its ends.
+// Two features in the same order along one direction at t = 0 and at t = 1 are separated throughout (motion_box.h).
 #pragma once
 
 #include "base/vec3.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Takes the caller's positions in: checks them, keeps both ends of each vertex's motion together, bounds the motion.
+// Checks the caller's positions, stores both ends of each vertex's motion together, and bounds the motion.
 #pragma once
 
 #include <cmath>

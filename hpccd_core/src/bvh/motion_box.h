@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bounds of a motion at both of its ends. Vertices move on straight lines, so in between a feature stays inside the
-// boxes that lead from one end to the other on straight lines as well: the largest of linear functions lies below the
-// chord of its values at the ends, the smallest above. Two features that lie in the same order along an axis at t = 0
-// and at t = 1 are therefore apart along it throughout, however far they move together. Boxes of the whole sweep
-// (bvh/box.h), which the published methods use, overlap there: on the published cloth-ball step they leave 6.9 million
-// pairs of features, these 1.8 million; where a step moves further than a triangle is large, forty times fewer.
+// Bounds of a motion at both of its ends. Vertices move on straight lines, so a feature stays inside the boxes that
+// move linearly from one end to the other: the maximum of linear functions is below the chord of its values at the
+// ends, and the minimum is above. Two features in the same order along an axis at t = 0 and at t = 1 are therefore
+// separated along it throughout, however far they move together. Boxes of the whole sweep (bvh/box.h), which the
+// published methods use, overlap in that case. On the published cloth-ball step sweep boxes leave 6.9 million pairs of
+// features, these boxes 1.8 million; where a step moves farther than the size of a triangle, forty times fewer.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Directions besides the axes along which boxes of snapshots have bounds.
+// Additional directions along which boxes of snapshots have bounds.
 #pragma once
 
 namespace hpccd {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cutting a set of primitives in two along the widest axis of their centers, for the build of the tree.
+// Splits a set of primitives along the widest axis of their centers, to build the tree.
 #pragma once
 
 #include <cstdint>

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Coordinates for scenes that are far larger than their features and mostly empty: one vertex parked a million lengths
-// away, or bodies in different places of the world. If such a scene is mapped as a whole (coordinate_map.h), small
-// parts get only a few distinct floats, and all boxes overlap. Here the wide gaps between vertices are shortened first.
+// away, or bodies in different places of the world. Mapped as a whole (coordinate_map.h), small parts of such a scene
+// have only a few distinct floats, and all boxes overlap. This map first shortens the wide gaps between vertices.
 //
-// Along the axis vertices keep their order, and no distance between two of them grows: features whose boxes are apart,
-// or farther apart than a reach, are so in the scene. No motion crosses a gap, so mapped vertices still move on
-// straight lines. The map bends a feature that spans a gap: its box contains it, but the hull of its corners does not.
+// Along the axis vertices keep their order, and no distance between two of them grows. Features whose mapped boxes are
+// separated, or farther apart than a reach, are so in the scene as well. No motion crosses a gap, so mapped vertices
+// still move on straight lines. The map bends a feature that spans a gap: its box contains it, but the hull of its
+// corners does not.
 #pragma once
 
 #include <vector>

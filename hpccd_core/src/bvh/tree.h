@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The merged hierarchy of all meshes (Kim et al. 2009, section 3.2): a binary tree whose leaves hold a few primitives
-// each, together with the vertices and edges these represent, laid out for tests of many boxes at once.
+// each, together with the vertices and edges that these represent, in a layout for tests of many boxes at once.
 #pragma once
 
 #include <cstdint>

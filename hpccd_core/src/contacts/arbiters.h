@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who answers where doubles are not sure of a place or a direction: integers of any size; on devices those of a fixed
-// size, or nobody yet.
+// Arbiters decide where doubles cannot determine a point or a direction: integers of any size on CPUs, integers of a
+// fixed size on devices, or none (the row stays undecided).
 #pragma once
 
 #include "elementary/exact/contact.h"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From what the threads found to the public result: canonical order, hash, earliest time, points and normals.
+// Converts the contacts that the threads found into the public result: canonical order, hash, earliest time, points
+// and normals.
 #pragma once
 
 #include "base/parallel.h"

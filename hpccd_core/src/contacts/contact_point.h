@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where two features touch and along which direction, at their time of contact: on CPUs and devices.
+// The contact point and the normal of two features at their time of impact. On CPUs and devices.
 #pragma once
 
 #include "contacts/arbiters.h"

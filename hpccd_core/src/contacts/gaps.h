@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From the nearest pairs of features to the public result.
+// Converts the nearest pairs of features into the public result of distances().
 #pragma once
 
 #include "base/cancellation.h"

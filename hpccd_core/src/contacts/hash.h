@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The hash of a set of contacts: a sum over contacts, the same in any order, so that threads and devices can each add
-// their part.
+// The hash of a set of contacts: a sum over contacts, independent of their order, so that threads and devices can each
+// add their part.
 #pragma once
 
 #include <cstdint>

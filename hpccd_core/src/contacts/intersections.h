@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From the edges and faces that the threads found to the public result: canonical order and hash.
+// Converts the intersecting edges and faces that the threads found into the public result: canonical order and hash.
 #pragma once
 
 #include "base/parallel.h"

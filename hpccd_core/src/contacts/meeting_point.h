@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where two segments that touch meet: parallel ones, points and any two lengths included. On CPUs and devices.
+// The point where two touching segments meet. The segments may be parallel, points, and of any two lengths. On CPUs
+// and devices.
 #pragma once
 
 #include <math.h>

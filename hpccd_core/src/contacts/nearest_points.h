@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The nearest points of two features at one time: on CPUs and devices.
+// The nearest points of two features at one time. On CPUs and devices.
 #pragma once
 
 #include "contacts/arbiters.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Contacts in the order of their feature pairs, vertex-face before edge-edge, in buckets that threads can sort on
-// their own. No pair is found twice, so the order is unique.
+// Sorts contacts by their feature pairs, vertex-face before edge-edge, in buckets that threads can sort independently.
+// No pair occurs twice, so the order is unique.
 #pragma once
 
 #include <vector>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Optional outputs of a contact, and the time at which its features are evaluated for them.
+// The optional outputs of a contact, and the time at which features are evaluated for them.
 #pragma once
 
 #include "base/vec3.h"

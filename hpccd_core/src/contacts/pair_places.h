@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Point, normal and nearest points of one pair, as far as they were asked for: on CPUs and devices.
+// Point, normal and nearest points of one pair, as far as they are requested. On CPUs and devices.
 #pragma once
 
 #include "contacts/contact_point.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The answers about the parts of a step as one answer about the step.
+// Merges the contacts of the parts of a step into the contacts of the step.
 #pragma once
 
 #include <span>

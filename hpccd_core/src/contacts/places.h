@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points, normals and nearest points of a contact, as far as they were asked for.
+// Points, normals and nearest points of contacts, as far as they are requested.
 #pragma once
 
 #include "contacts/outputs.h"

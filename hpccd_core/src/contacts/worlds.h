@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The answers of many worlds as one: their rows one after the other, and where those of each begin.
+// Concatenates the results of many worlds: their rows in order, and the offset of each world.
 #pragma once
 
 #include <vector>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether the features of one pair stay apart up to a time for all to see, where only the earliest contact matters:
-// much cheaper than to decide whether they touch at all.
+// Decides cheaply whether the features of one pair certainly stay apart up to a given time. Used where only the
+// earliest contact matters: much cheaper than deciding whether they touch at all.
 #pragma once
 
 #include "base/hd.h"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Elementary tests on a batch of candidate pairs, in the lanes of one instruction set. The sets give the same bits.
+// Elementary tests on a batch of candidate pairs, in the lanes of one instruction set. Results are bit-identical for
+// all instruction sets.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Included once per instruction set, after its header (base/simd/scalar.h). Uses nothing from the standard library at
-// run time: an inline function compiled here could be linked into code for older processors.
+// Included once per instruction set, after its header (base/simd/scalar.h). Must not use the standard library at run
+// time: an inline function compiled here could be linked into code for older processors.
 
 #include "base/simd/twice.h"
 #include "base/ticks.h"

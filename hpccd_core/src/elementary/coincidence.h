@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Features of a snapshot that have a vertex at the same place, though it is not the same vertex: they touch, at
-// distance 0, whatever else there is. Meshes that were cut apart along a seam are full of such pairs, which no error
-// bound decides.
+// Features of a snapshot that have different vertices at the same place. They touch, at distance 0. Meshes that were
+// cut apart along a seam have many such pairs, which no error bound decides.
 #pragma once
 
 #include "base/vec3.h"

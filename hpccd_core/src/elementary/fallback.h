@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a tier does with a query that the error bounds could not decide.
+// The fallback of each tier for queries that the error bounds leave undecided.
 #pragma once
 
 #include <cstdint>

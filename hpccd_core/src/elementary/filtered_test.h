@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The elementary test as a floating-point filter: contact, no contact or undecided, each of the first two proven by
-// forward error bounds. Undecided queries go on to the tier's fallback (exact arithmetic, a search, a heuristic).
+// The elementary test as a floating-point filter: contact, no contact or undecided. The first two are proven by
+// forward error bounds. Undecided queries go to the tier's fallback (exact arithmetic, a search, a tolerance).
 #pragma once
 
 #include "elementary/inside.h"

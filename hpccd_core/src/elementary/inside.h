@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where p lies in the plane of a and b: with n = a x b, alpha n = p x b and beta n = a x p.
+// The position of p in the plane of a and b: with n = a x b, alpha n = p x b and beta n = a x p.
 #pragma once
 
 #include "elementary/coplanarity.h"

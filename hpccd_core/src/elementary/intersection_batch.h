@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Edges against faces in the snapshot at t = 0, a batch of candidate pairs in the lanes of one instruction set. The
-// sets give the same bits.
+// Edge-face tests in the snapshot at t = 0, on a batch of candidate pairs in the lanes of one instruction set. Results
+// are bit-identical for all instruction sets.
 #pragma once
 
 #include "elementary/batch.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Included once per instruction set, after its header (base/simd/scalar.h), on the terms of batch.inl.
+// Included once per instruction set, after its header (base/simd/scalar.h), under the rules of batch.inl.
 
 #include "elementary/intersection_batch.h"
 #include "elementary/intersection_filter.h"

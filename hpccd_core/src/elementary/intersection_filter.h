@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether an edge and a face intersect in one snapshot, as a floating-point filter: yes, no or undecided, each of the
-// first two proven by forward error bounds.
+// The edge-face intersection test of one snapshot as a floating-point filter: yes, no or undecided. The first two are
+// proven by forward error bounds.
 #pragma once
 
 #include "elementary/inside.h"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A batch's pairs, as many at a time as there are lanes. Part of distance_batch.inl and intersection_batch.inl.
+// Processes the pairs of a batch in groups of as many pairs as there are lanes. Part of distance_batch.inl and
+// intersection_batch.inl.
 
 // The pairs at `where` (null: all); the last group is filled up with copies of the last pair. What Pairs::load brings
 // into lanes goes to `function`, with the positions of these pairs and a bit for each lane that counts.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Brings the vectors p, a, b of several pairs (motion.h) from rows of vertices into lanes. Part of pair_lanes.inl.
-// Subtractions are done a row at a time (both ends of a motion at once), then rows are turned into lanes.
+// Loads the vectors p, a, b of several pairs (motion.h) from rows of vertices into lanes. Part of pair_lanes.inl.
+// Subtractions are done a row at a time (both ends of a motion at once), then rows are transposed into lanes.
 
 // Both ends: a row of eight.
 HPCCD_HD const double* row_of(const VertexMotion& v) { return reinterpret_cast<const double*>(&v); }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one configuration behind both elementary tests: a connecting vector p and two spanning vectors a, b, each
-// moving on a straight line. The features can only touch while p lies in the plane of a and b, at p = alpha a + beta b.
-//   vertex-face: p = v - f0, a = f1 - f0, b = f2 - f0; inside where alpha >= 0, beta >= 0, alpha + beta <= 1
-//   edge-edge:   p = b0 - a0, a = a1 - a0, b = b1 - b0; inside where 0 <= alpha <= 1, -1 <= beta <= 0
+// The common configuration of both elementary tests: a connecting vector p and two spanning vectors a, b, each moving
+// on a straight line. The features can only touch while p lies in the plane of a and b, at p = alpha a + beta b.
+//  vertex-face: p = v - f0, a = f1 - f0, b = f2 - f0; inside where alpha >= 0, beta >= 0, alpha + beta <= 1
+//  edge-edge:   p = b0 - a0, a = a1 - a0, b = b1 - b0; inside where 0 <= alpha <= 1, -1 <= beta <= 0
 #pragma once
 
 #include "base/vec3.h"

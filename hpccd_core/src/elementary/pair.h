@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pairs of features, before and after the elementary test: vertex and face, or edges with first < second. The same on
-// CPUs and devices, and between them.
+// Pairs of features, before and after the elementary test: vertex and face, or edges with first < second. The layout
+// is the same on CPUs and devices.
 #pragma once
 
 #include <cstdint>

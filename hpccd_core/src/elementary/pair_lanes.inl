@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of many pairs of features in lanes: brings them in and takes the outcomes apart. Part of batch.inl and
+// Runs tests of many pairs of features in lanes: loads the pairs and distributes the results. Part of batch.inl and
 // distance_batch.inl.
 
 #include "elementary/load.inl"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pairs of a batch that are still looked at, by the vertices of their features: found once, for all the filters to
-// come. Part of kdop_filter.inl.
+// The remaining pairs of a batch, with the vertices of their features, which are looked up once for all filters. Part
+// of kdop_filter.inl.
 
 inline constexpr std::uint32_t most_lanes = 16;  // and so many copies of the last one behind it, to fill up lanes
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How sure an answer of the floating-point tests must be, and which time of contact a tier reports.
+// How certain a decision of the floating-point tests must be, and which time of impact a tier reports.
 #pragma once
 
 #include "base/real.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Single queries through the same batches and fallbacks as whole scenes.
+// Single queries, computed by the same batches and fallbacks as whole scenes.
 #include <algorithm>
 #include <cmath>
 #include <memory>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Roots of the coplanarity cubic: which pieces of [0, 1] certainly hold exactly one, and where it is.
+// Roots of the coplanarity cubic: the parts of [0, 1] that certainly contain exactly one root, and the position of
+// that root.
 #pragma once
 
 #include "elementary/coplanarity.h"

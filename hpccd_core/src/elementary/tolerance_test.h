@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The fallback of the "balanced" tier: what the error bounds could not decide is decided in double precision with
-// a relative tolerance. Borders count as inside, motion that is coplanar throughout has a branch of its own.
+// The fallback of the "balanced" tier: pairs that the error bounds leave undecided are decided in double precision
+// with a relative tolerance. Borders count as inside. Motion that is coplanar throughout has a branch of its own.
 #pragma once
 
 #include "elementary/inside.h"

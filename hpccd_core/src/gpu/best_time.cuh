@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The best time so far of a frame that looks for the earliest contacts, and how much of its motion matters
+// The best time so far of a frame that searches for the earliest contacts, and how much of its motion still matters
 // (traverse/boxes_until.h).
 #pragma once
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// bvh/motion_bounds.cpp on the device: extent of the scene, then both ends and the box of each vertex. Same arithmetic.
+// bvh/motion_bounds.cpp on the device, with the same arithmetic: extent of the scene, then both ends and the box of
+// each vertex.
 #pragma once
 
 #include "bvh/coordinate_map.h"

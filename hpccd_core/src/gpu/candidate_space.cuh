@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a warp keeps the features of two leaves and the candidates among them, in shared memory.
+// Shared memory of a warp for the features of two leaves and the candidates among them.
 #pragma once
 
 #include "bvh/tree.h"

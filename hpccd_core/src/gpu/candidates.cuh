@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Candidate pairs of features (traverse/leaf_pairs.inl) and the first filter on them, in one kernel: candidates wait in
-// shared memory until a warp is full, and only those that pass the sign test reach device memory (a third of them on
+// Candidate pairs of features (traverse/leaf_pairs.inl) and the first filter, in one kernel. Candidates wait in shared
+// memory until a warp is full, and only those that pass the sign test are written to device memory (a third of them on
 // cloth-ball, a fifth on n-body).
 #pragma once
 

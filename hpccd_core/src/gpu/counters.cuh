@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the kernels count; cleared before each frame, or each submission of the hybrid.
+// Counters of the kernels, cleared before each frame, or before each submission of the hybrid.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which GPUs there are, or why none is usable. Compiled with and without CUDA.
+// Lists the usable GPUs, or the reason why there is none. Compiled with and without CUDA.
 #pragma once
 
 #include <cstddef>

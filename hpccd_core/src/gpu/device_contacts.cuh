@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The contacts of a frame: as the kernels find them, in canonical order, and as the caller sees them.
+// The contacts of a frame: in the order in which kernels find them, in canonical order, and as rows for the caller.
 #pragma once
 
 #include <algorithm>

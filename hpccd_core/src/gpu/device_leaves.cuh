@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The leaves of a hierarchy on the device: which features lie in each, and this frame's boxes of them, in each world.
+// The leaves of a hierarchy on the device: the features in each leaf, and their boxes of this frame in each world.
 #pragma once
 
 #include <algorithm>

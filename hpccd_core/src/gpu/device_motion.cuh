@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// This frame's motion of every vertex, as the later kernels read it.
+// The motion of every vertex in this frame, in the layout that later kernels read.
 #pragma once
 
 #include <algorithm>

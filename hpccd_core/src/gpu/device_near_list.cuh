@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// backends/near_list.h on the device: pairs that are near each other in one snapshot, and how far from it and how far
-// at all a motion takes its vertices.
+// backends/near_list.h on the device: the near pairs of one snapshot, and how far a motion takes its vertices from the
+// snapshot and in total.
 #pragma once
 
 #include <algorithm>

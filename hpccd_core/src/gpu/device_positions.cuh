@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The caller's positions, from wherever they are to the device of a pipeline.
+// Copies the caller's positions, wherever they are, to the device of a pipeline.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What stays on the device as long as the scene: features, meshes, rules between them, and how pairs are numbered.
+// Data on the device that lasts as long as the scene: features, meshes, rules between them, and the numbering of
+// pairs.
 #pragma once
 
 #include <algorithm>

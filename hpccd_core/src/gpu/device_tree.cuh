@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The tree on the device: its topology, and this frame's boxes of all nodes, in each world.
+// The tree on the device: its topology, and the boxes of all nodes in this frame, in each world.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a device to the host, whatever the detector does there: the CPU may be asked before the device is, or instead.
+// Copies from a device to the host, independent of the detector's state: the CPU may compute before the device, or
+// instead of it.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which root tests a pair needs in double precision, and what decides where its error bounds do not: a thread a pair.
+// Decides which root tests a pair needs in double precision, and what decides the pair if error bounds do not: one
+// thread per pair.
 #pragma once
 
 #include "elementary/apart_until.h"

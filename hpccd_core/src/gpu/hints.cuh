@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A few pairs that touched early in the last frame. They give the next one a bound of its earliest time before its
-// boxes are made: these then reach no farther.
+// Hints: a few pairs that touched early in the previous frame. They give the next frame an upper bound on its earliest
+// time before its boxes are built, so that boxes need not bound the motion after that time.
 #pragma once
 
 #include "elementary/distance/separation_test.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exact arithmetic on the device: what twice the precision of doubles leaves open, in the CPU's integers
-// (elementary/exact), a thread a pair; wider ones each time for what stays open. What those leave open goes to the
+// Exact arithmetic on the device, for pairs that 106 bits leave undecided, in the CPU's integers (elementary/exact),
+// one thread per pair. Each stage uses wider integers for the pairs that the previous one left. The rest goes to the
 // host.
 #include "elementary/exact/earliest.h"
 #include "elementary/exact/given_motion.h"

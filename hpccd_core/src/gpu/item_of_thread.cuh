@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Code so deep that its threads do not come out of it as the warp that went in. Of a warp's barriers the hardware holds
-// sixteen; where nested branches take more, ptxas (13.0) keeps them elsewhere, and threads that wait are let go too
-// soon: in one of 100 frames those behind lost their pairs to votes and loops that they took for the whole warp's. So
-// each thread of such a kernel has one item, writes what it has found, and ends; another kernel collects.
+// Kernels whose code is so deeply nested that a warp's threads do not reconverge. The hardware has sixteen barriers
+// per warp. If nested branches need more, ptxas (13.0) stores them elsewhere, and waiting threads continue too early:
+// in one of 100 frames the remaining threads took votes and loops of a part of the warp for those of the whole warp,
+// and pairs were lost. Therefore each thread of such a kernel handles one item, writes its result, and ends; another
+// kernel collects the results.
 #pragma once
 
 #include "gpu/launch_params.cuh"

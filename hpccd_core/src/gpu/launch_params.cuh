@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the kernels of one frame read and write. Passed by value: all pointers are to device memory.
+// Inputs and outputs of the kernels of one frame. Passed by value: all pointers are to device memory.
 #pragma once
 
 #include <cstdint>

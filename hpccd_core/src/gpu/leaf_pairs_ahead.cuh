@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A few pairs of leaves, and the leaves, as a warp has them: a lane a pair, and one more for its second leaf. So what
-// the pairs need first is fetched for all of them at once.
+// Prefetches a few pairs of leaves for a warp: one lane per pair, and one more for its second leaf. The data that the
+// pairs need first is fetched for all of them at once.
 #pragma once
 
 #include "gpu/launch_params.cuh"

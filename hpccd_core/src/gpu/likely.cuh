@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What follows the first filter for the tier that promises nothing: in single precision, then in double precision what
-// that cannot tell (elementary/batch.inl, test_likely). By these bounds a filter is no proof of what another would have
-// said, so they stand in the CPU's order, and both find the same. One kernel for all lists of a stage, a row of blocks
-// a list: so they run side by side.
+// The stages after the first filter for the tier `fast`: single precision, then double precision for pairs that it
+// leaves undecided (elementary/batch.inl, test_likely). These bounds are not proven, so one filter does not imply what
+// another would decide. The filters therefore run in the CPU's order, and both find the same contacts. One kernel
+// processes all lists of a stage, with one row of blocks per list, so that they run concurrently.
 #pragma once
 
 #include "elementary/kdop_filter.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Device and page-locked memory. Buffers only grow, so frames of a settled scene allocate nothing.
+// Device and page-locked memory. Buffers only grow, so frames allocate nothing once sizes have settled.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Features of two leaves in one snapshot, side by side in shared memory. The first leaf stays while others come to it:
-// five on average on the published n-body scene.
+// Features of two leaves in one snapshot, side by side in shared memory. The first leaf stays while others are
+// compared with it: five on average on the published n-body scene.
 #pragma once
 
 #include "gpu/candidate_space.cuh"

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a frame found, in canonical order, without a sort: pairs are counted by their first feature as they are found,
-// so that each finds its place among those of other features by a sum, and among those of its own by looking at them.
-// All on the device, without a look from the host (H100, cloth-ball: 0.03 ms; keys sorted by radix took 0.11).
+// Brings the results of a frame into canonical order without a sort. Pairs are counted by their first feature when
+// they are found. A prefix sum gives the position among other features, a comparison the position among pairs of the
+// same feature. Everything runs on the device without involving the host (H100, cloth-ball: 0.03 ms; a radix sort of
+// keys took 0.11).
 #pragma once
 
 #include "contacts/hash.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How kernels read and lengthen lists of pairs.
+// Reads and appends lists of pairs in kernels.
 #pragma once
 
 #include "gpu/launch_params.cuh"

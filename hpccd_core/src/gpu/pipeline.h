@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A whole frame on one GPU: bounds, refit, traversal, filters, elementary tests, sorted contacts. Only positions go in
-// and only contacts come out. What neither the device nor the tier's error bounds can decide comes back as well.
+// A whole frame on one GPU: bounds, refit, traversal, filters, elementary tests, sorted contacts. Only positions are
+// transferred to the device and only contacts back, with the pairs that neither the device nor the tier's error bounds
+// can decide.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What hosts and devices tell each other of the places of a frame's rows.
+// Data that host and device exchange about the points, normals and nearest points of a frame's rows.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Normals of the rows that doubles are not sure of, in the CPU's integers of one and two limbs.
+// Normals of rows that doubles leave undecided, in the CPU's integers of one and two limbs.
 #include "gpu/item_of_thread.cuh"
 #include "gpu/pair_lists.cuh"
 #include "gpu/write_places.cuh"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points, normals and nearest points with the CPU's bits, a thread a row.
+// Points, normals and nearest points, bit-identical to the CPU's, one thread per row.
 #include "gpu/feature_pair.cuh"
 #include "gpu/pair_lists.cuh"
 #include "gpu/write_places.cuh"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Of which rows points, normals and nearest points are asked for, and where they go. All pointers are to device memory.
+// The rows for which points, normals and nearest points are requested, and the output arrays. All pointers are to
+// device memory.
 #pragma once
 
 #include "contacts/pair_places.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames that no host looks at: what they tell of themselves.
+// Frames that involve no host: their counts and state.
 #pragma once
 
 #include "gpu/ordering.cuh"

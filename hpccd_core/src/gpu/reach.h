@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// By how much boxes on the device grow, so that features within a separation of each other overlap.
+// The amount by which boxes on the device grow, so that boxes of features within a separation of each other overlap.
 #pragma once
 
 #include "base/hd.h"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// bvh/refit.cpp on the device: a warp a leaf; the last to arrive at a node carries on to its parent (Karras 2012).
+// bvh/refit.cpp on the device: one warp per leaf; the last warp that arrives at a node continues with its parent
+// (Karras 2012).
 #pragma once
 
 #include <cuda/atomic>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rows of a frame's results as the caller sees them, in page-locked memory or on the device.
+// The rows of a frame's results in the caller's layout, in page-locked memory or on the device.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Results that the CPU has computed, brought to the device where the caller expects them.
+// Copies results that the CPU has computed to the device where the caller expects them.
 #pragma once
 
 #include "hpccd/hpccd.h"

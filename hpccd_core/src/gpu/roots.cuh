@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Contacts of the pairs that the filters leave, in double precision (elementary/batch.inl, test_proven).
+// Root tests in double precision of the pairs that the filters leave (elementary/batch.inl, test_proven).
 #pragma once
 
 #include "gpu/sieve.cuh"

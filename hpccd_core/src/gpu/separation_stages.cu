@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of a frame in which some pairs have a separation (elementary/distance/separation_test.h), a thread a pair.
+// Tests of a frame in which some pairs have a separation (elementary/distance/separation_test.h), one thread per pair.
 #include "elementary/distance/separation_test.h"
 #include "gpu/candidates.cuh"
 #include "gpu/elementary.cuh"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What follows the first filter in single precision: the pairs that it leaves, by the roots that they may have. By
-// proven bounds for the tiers that promise something, whose roots are then sought in double precision
-// (elementary/batch.inl, test_proven); by likely ones for the tier that does not (likely.cuh).
+// The stages after the first filter in single precision: the remaining pairs, sorted by the roots that they may have.
+// Tiers with a promise use proven bounds, and search the roots in double precision (elementary/batch.inl,
+// test_proven). The tier `fast` uses likely bounds (likely.cuh).
 #pragma once
 
 #include "gpu/elementary.cuh"

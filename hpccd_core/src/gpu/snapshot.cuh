@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of one snapshot, which stands at t = 0: what is near (elementary/distance/proximity_test.h), and which edges
-// meet which faces (elementary/intersection_filter.h).
+// Tests of one snapshot, at t = 0: pairs within a distance (elementary/distance/proximity_test.h), and edges that
+// intersect faces (elementary/intersection_filter.h).
 #pragma once
 
 #include "elementary/coincidence.h"

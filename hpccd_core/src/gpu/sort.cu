@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Apart from the other kernels: CUB's headers take longer to compile than all of these.
+// In a source of its own: CUB's headers take longer to compile than all other kernels.
 #include <cub/device/device_radix_sort.cuh>
 #include <cub/device/device_scan.cuh>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All features of two leaves that may touch one of the other leaf, side by side in shared memory: corners are fetched
-// once, all of them together, and pairs of different kinds fill a warp together.
+// All features of two leaves that may touch a feature of the other leaf, side by side in shared memory. Corners are
+// fetched once and all together, and pairs of different kinds fill a warp together.
 #pragma once
 
 #include "gpu/candidate_space.cuh"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the stages of a frame are launched, one after the other on one stream.
+// Launches the stages of a frame one after the other on one stream.
 #pragma once
 
 #include <algorithm>

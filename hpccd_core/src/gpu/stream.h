@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Streams and events that end with their owner, and device time by stage.
+// Streams and events with the lifetime of their owner, and device time per stage.
 #pragma once
 
 #include <algorithm>

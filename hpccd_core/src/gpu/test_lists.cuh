@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The lists between the stages of the elementary tests, and the stages themselves: from pairs of leaves to contacts.
+// The stages of the elementary tests and the lists between them: from pairs of leaves to contacts.
 #pragma once
 
 #include <algorithm>

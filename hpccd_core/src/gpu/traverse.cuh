@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pairs of leaves whose boxes overlap: one warp goes down the tree with a few neighbouring leaves at once, 32 pairs of
-// leaf and node at a time, depth first. (With one leaf two of the 32 lanes had a node on the published n-body scene,
-// and it took three times as long.) A leaf looks only at leaves of its world from its own number on, so that each pair
-// comes once. The pairs are the CPU's: a pair of leaves that overlap is reached whatever the way down.
+// Traversal: pairs of leaves whose boxes overlap. One warp descends the tree depth first with a few neighbouring
+// leaves at once, 32 pairs of leaf and node at a time. (With a single leaf only two of the 32 lanes had a node on the
+// published n-body scene, and the traversal took three times as long.) A leaf is paired only with leaves of its world
+// whose number is not smaller, so that each pair occurs once. The pairs are those of the CPU: every pair of
+// overlapping leaves is reached, whatever the order of the traversal.
 #pragma once
 
 #include "gpu/best_time.cuh"

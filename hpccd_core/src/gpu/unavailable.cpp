@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// In builds without CUDA.
+// For builds without CUDA.
 #include "gpu/device.h"
 #include "gpu/download.h"
 #include "gpu/memory_on_device.h"

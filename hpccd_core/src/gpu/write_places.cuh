@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The places of one row.
+// Writes point, normal and nearest points of one row.
 #pragma once
 
 #include "gpu/places_task.cuh"

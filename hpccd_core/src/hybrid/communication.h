@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The master CPU-GPU communication thread (Kim et al. 2009, section 5.1): sends runs of full segments to the devices,
-// takes in what they have finished, hands out empty segments. It alone talks to the devices.
+// collects their results, and hands out empty segments. No other thread communicates with the devices.
 #pragma once
 
 #include <atomic>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What one element of the GPU task queue needs on the device, and its output buffer in page-locked memory, which the
-// kernels write themselves: nothing has to be copied back.
+// Device memory of one element of the GPU task queue, and its output buffer in page-locked memory. Kernels write
+// directly to the buffer: nothing has to be copied back.
 #pragma once
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Section 5 of Kim et al. 2009 as the detector sees it: positions are sent while the hierarchy is refitted, the CPU
-// threads' traversal hands pairs of leaves to the devices, and what these find joins what the threads found. What a
-// device that fails leaves undone is given back: no contact is lost.
+// Section 5 of Kim et al. 2009, as used by the detector: positions are sent while the hierarchy is refitted, the
+// traversal of the CPU threads hands pairs of leaves to the devices, and the devices' contacts are merged with those
+// of the threads. Work that a failed device leaves is returned to the threads: no contact is lost.
 #pragma once
 
 #include <deque>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How empty segments come from the communication thread to a CPU thread: asked for and given without either waiting.
+// Transfers empty segments from the communication thread to a CPU thread, without either waiting.
 #pragma once
 
 #include <atomic>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The triangle index queue (Kim et al. 2009, section 5.1): segments of index pairs in one piece of memory, filled by
+// The triangle index queue (Kim et al. 2009, section 5.1): segments of index pairs in one block of memory, filled by
 // CPU threads, sent and emptied by the communication thread.
 #pragma once
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A CPU thread's end of the triangle index queue: it fills one of its two segments while another one is on its way, and
-// tests half of a full segment itself where the devices lag behind (Kim et al. 2009, section 5.1, load balancing).
+// The CPU thread's end of the triangle index queue: the thread fills one of its two segments while the other one is
+// being sent, and tests half of a full segment itself if the devices lag behind (Kim et al. 2009, section 5.1, load
+// balancing).
 #pragma once
 
 #include "hybrid/communication.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the communication thread asks of a device that performs elementary tests (Kim et al. 2009, section 5). All calls
-// come from one thread and return at once; every one may throw, which leaves the frame to the CPU.
+// The interface of a device that runs elementary tests, as used by the communication thread (Kim et al. 2009, section
+// 5). All calls come from one thread and return at once. Each may throw, which leaves the frame to the CPU.
 #pragma once
 
 #include <cstdint>

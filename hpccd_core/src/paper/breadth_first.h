@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A front of nodes without parent-child relationship, by traversing the hierarchy from its root in breadth-first order
-// until there are enough of them (Kim et al. 2009, section 4.2 and Fig. 4).
+// A front of nodes without parent-child relations, found by traversing the hierarchy from its root in breadth-first
+// order until there are enough nodes (Kim et al. 2009, section 4.2 and Fig. 4).
 #pragma once
 
 #include <deque>

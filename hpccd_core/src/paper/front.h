@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The front of the traversal tree (Tang et al. 2009): the pairs of nodes at which the last traversal ended, because the
-// boxes do not overlap or both nodes are leaves. The next traversal starts from there: it goes down where boxes overlap
-// that did not, and up where pairs have come apart.
+// The front of the traversal tree (Tang et al. 2009): the pairs of nodes at which the last traversal ended, because
+// the boxes do not overlap or both nodes are leaves. The next traversal starts there: it descends where boxes now
+// overlap, and ascends where pairs have separated.
 #pragma once
 
 #include <vector>

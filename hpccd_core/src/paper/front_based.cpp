@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The front-based decomposition of Tang et al. 2009, "Multi-core collision detection between deformable models", with
-// which Kim et al. 2009 compare in section 6.3: the front of the traversal tree is kept from step to step and dealt out
-// to the threads. It names nodes, so the hierarchy is refitted, never restructured; where that has lost too much,
-// hierarchy and front start anew.
+// which Kim et al. 2009 compare in section 6.3: the front of the traversal tree is kept from step to step and
+// distributed to the threads. The front refers to nodes, so the hierarchy is refitted but never restructured; when its
+// quality has become too low, hierarchy and front are rebuilt.
 #include "bvh/tree.h"
 #include "paper/build.h"
 #include "paper/front.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The binary hierarchy of Kim et al. 2009, sections 3.1 and 3.2: all meshes merged, AABBs of the motion, one triangle
-// (or vertex that is in no triangle) a leaf. It can be split lazily: a node may have its box and its triangles, but no
-// children yet.
+// (or one vertex of no triangle) per leaf. Nodes can be split lazily: a node may have its box and its triangles, but
+// no children yet.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Inter-CD task units of high-level nodes, each performed by all threads (Kim et al. 2009, section 4.4).
+// Inter-CD task units of high-level nodes, each processed by all threads (Kim et al. 2009, section 4.4).
 #pragma once
 
 #include "paper/task_units.h"

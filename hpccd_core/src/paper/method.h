@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the detector asks of a published method. Each gives the contacts of the default traversal, bit for bit.
+// The interface of a published method. Each finds the contacts of the default traversal, bit-identical.
 #pragma once
 
 #include <map>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The naive parallel method of Kim et al. 2009, section 3.2, which Fig. 7 draws beside the published one: the pairs of
-// one collision test pair queue are divided among the threads, each continues with a queue of its own, work is
-// redistributed through a shared queue, and reconstruction of any node takes a lock.
+// The naive parallel method of Kim et al. 2009, section 3.2, the baseline of their Fig. 7: the pairs of one collision
+// test pair queue are distributed to the threads, each continues with its own queue, work is redistributed through a
+// shared queue, and the reconstruction of any node takes a lock.
 #include "paper/method.h"
 #include "paper/shared_pairs.h"
 #include "paper/upkeep.h"

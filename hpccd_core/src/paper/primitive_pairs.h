@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Representative triangles (Kim et al. 2009, section 6; Curtis et al. 2008): a pair of triangles stands for the pairs
-// of the features that they represent, so that no two pairs of triangles bring the same elementary test.
+// Representative triangles (Kim et al. 2009, section 6; Curtis et al. 2008): a pair of triangles represents the pairs
+// of the features that are assigned to them, so that no two pairs of triangles lead to the same elementary test.
 #pragma once
 
 #include <vector>

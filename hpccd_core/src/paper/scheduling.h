@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Dynamic task reassignment (Kim et al. 2009, section 4.3): a thread without task units asks the thread whose front
-// node covers the most triangles, and sleeps until it is woken with nodes. Locks are taken only where a thread has run
-// out of work or gives some away, never in the main loop.
+// Dynamic task reassignment (Kim et al. 2009, section 4.3): a thread without task units requests work from the thread
+// whose front node covers the most triangles, and sleeps until it receives nodes. Locks are taken only by threads that
+// have run out of work or give work away, never in the main loop.
 #pragma once
 
 #include <atomic>

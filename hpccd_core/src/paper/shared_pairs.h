@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Redistribution of the naive method (Kim et al. 2009, section 3.2): threads that have run out of pairs take some from
-// a queue that all share, behind a lock; threads that have pairs put half of theirs there while others wait.
+// Redistribution in the naive method (Kim et al. 2009, section 3.2): threads without pairs take some from a shared
+// queue behind a lock; threads with pairs put half of theirs there while others wait.
 #pragma once
 
 #include <atomic>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inter-CD task units (Kim et al. 2009, section 4.1 and Listing 1). A unit of node n finds the collisions between the
-// two children of n; it reads and restructures nodes below n only. No two nodes in the threads' task unit queues are
-// parent and child, so that threads work on disjoint sets of nodes and need no lock.
+// two children of n; it reads and restructures only nodes below n. No two nodes in the threads' task unit queues are
+// parent and child, so threads work on disjoint sets of nodes and need no lock.
 #pragma once
 
 #include <vector>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lazy selective restructuring (Kim et al. 2009, sections 3.1, 3.3 and 6): a node that culls worse than when it was
-// split is split anew, when a traversal first needs its children in a step; its descendants likewise, if and when they
-// are needed. Nothing is restructured that no traversal reaches.
+// Lazy selective restructuring (Kim et al. 2009, sections 3.1, 3.3 and 6): a node that culls worse than after its last
+// split is split again when a traversal first needs its children in a step; its descendants likewise, if and when they
+// are needed. Nodes that no traversal reaches are not restructured.
 //
-// A node is examined before any of its children is named in a pair, and at most once a step. So no pair ever names a
-// node that a later restructuring of an ancestor moves, in whatever order the pairs are processed.
+// A node is examined before any of its children is named in a pair, and at most once per step. Therefore no pair ever
+// names a node that a later restructuring of an ancestor moves, in whatever order the pairs are processed.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One turn of the main collision detection loop (Kim et al. 2009, sections 3.2 and 4.1, Listing 1): the overlap test of
-// a pair, then its refinement or the elementary tests.
+// One iteration of the main collision detection loop (Kim et al. 2009, sections 3.2 and 4.1, Listing 1): the overlap
+// test of a pair, then its refinement or the elementary tests.
 #pragma once
 
 #include "paper/hierarchy.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Functions of the C library, each by itself, as Python calls them. A compiler that sees the sine and the cosine of one
-// number asks for both at once, and makes a product of a square: the last bits may be others.
+// Functions of the C library, each called separately, as Python calls them. A compiler that sees sine and cosine of
+// the same number calls both at once, and turns a square into a product: the last bits may differ.
 #pragma once
 
 namespace hpccd::rigid {

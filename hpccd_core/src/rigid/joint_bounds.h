@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How links move while joints go at constant speed from values to values; hpccd_core/rigid/joints.py: the bounds.
+// The motion of links while joints move at constant speed between values. hpccd_core/rigid/joints.py computes the
+// bounds.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The joints of a robot, and where they put its links.
+// The joints of a robot, and the poses of its links.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The vertices of all links of a robot, each at the pose of its link.
+// The vertices of all links of a robot, each link at its pose.
 #pragma once
 
 #include <cstddef>

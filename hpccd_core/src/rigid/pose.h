@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rigid motions: hpccd_core/rigid/transform.py to the last bit, so sums go in its order.
+// Rigid motions, bit-identical to hpccd_core/rigid/transform.py; sums are evaluated in its order.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long the edges of a scene are, by a few of them: whoever asks looks at the same ones, so that all decide alike.
+// The lengths of the edges of a scene, estimated from a fixed sample, so that all callers decide alike.
 #pragma once
 
 #include <algorithm>

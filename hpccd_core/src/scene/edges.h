@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The edges of a scene, each once.
+// The unique edges of a scene.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One value for each pair of meshes. A scene of few meshes has a table of all pairs. One of many meshes has one value
-// for most pairs and a hash table for the others: for 8,000 bodies a table of all pairs would take 64 MB per byte.
+// One value for each pair of meshes. For few meshes this is a table of all pairs. For many meshes it is one default
+// value and a hash table of the exceptions: with 8,000 bodies a table of all pairs would need 64 MB per byte.
 #pragma once
 
 #include <algorithm>

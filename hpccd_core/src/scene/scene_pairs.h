@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lists the values that were set for single pairs of meshes: asking for all pairs takes the square of the meshes.
+// Lists the values that are set for single pairs of meshes. Enumerating all pairs would take the square of the number
+// of meshes.
 #pragma once
 
 #include "hpccd/hpccd.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The minimum separation of each pair of meshes, as it is now.
+// The current minimum separation of each pair of meshes.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks of what is to be tested.
+// Checks the features to be tested.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which pairs of meshes are tested at all.
+// The pairs of meshes that are tested.
 #pragma once
 
 #include <cstdint>

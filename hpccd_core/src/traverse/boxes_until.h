@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which boxes count where the earliest contacts are looked for: those that may overlap no later than the best time so
-// far, which falls while the search goes on.
+// Overlap of boxes when only the earliest contacts are searched: only boxes that may overlap before the best time so
+// far count. That time decreases during the search.
 #pragma once
 
 #include <utility>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Candidates as they are found: a feature of one leaf and a bit for each of the other's. They are written out together:
-// whether there are any is known late, and the processor guesses it wrong every third time. Part of leaf_pairs.inl and
-// leaf_edge_faces.inl.
+// Candidates in the form in which they are found: a feature of one leaf, and one bit for each feature of the other.
+// They are written out together, because whether there are any is known late, and the branch would be mispredicted
+// every third time. Part of leaf_pairs.inl and leaf_edge_faces.inl.
 
 class CandidateRows {
  public:

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far the vertices of each node have left where they were in a snapshot, at both ends of a motion. Two features
-// that were apart there touch only where they go apart by as much: a mesh that falls or turns goes far, and neighbours
-// in it hardly apart. Where the pairs that were near are listed, few others are left to look at.
+// Drift: how far the vertices of each node have moved from their positions in a snapshot, at both ends of a motion.
+// Two features that were apart in the snapshot can only touch if they move apart by as much. A mesh that falls or
+// rotates moves far, but neighbours in it hardly move apart. If the near pairs of the snapshot are listed, few other
+// pairs have to be searched.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The amount by which the boxes of two meshes have grown beyond half of their own separation each: a mesh's boxes grow
-// by half of the largest separation of its pairs. Boxes of these two meshes that overlap by less than it are too far
-// apart.
+// The excess of a pair of meshes: boxes of a mesh grow by half of the largest separation of its pairs; the excess is
+// how much more the boxes of two meshes have grown than half of their own separation each. Boxes that overlap by less
+// than the excess are too far apart.
 #pragma once
 
 #include <algorithm>

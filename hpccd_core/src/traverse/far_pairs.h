@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Candidate feature pairs of two leaves of different meshes that are far apart beside their size, in one snapshot.
+// Candidate feature pairs of two leaves of different meshes that are far apart compared with their size, in one
+// snapshot.
 #pragma once
 
 #include "traverse/leaf_pairs.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Boxes and candidates in double precision, for smallest distances in a scene whose features are so small that floats
-// hardly distinguish them (MotionBounds::spread). For two bodies of size 1 that are 1e7 apart, all pairs of features
+// Boxes and candidates in double precision, for smallest distances in scenes whose features are so small that floats
+// hardly distinguish them (MotionBounds::spread). For two bodies of size 1 at a distance of 1e7, all pairs of features
 // have the same distance in floats.
 #pragma once
 

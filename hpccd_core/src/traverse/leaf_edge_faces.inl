@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Included once per instruction set, after its header (base/simd/scalar.h), on the terms of leaf_pairs.inl.
+// Included once per instruction set, after its header (base/simd/scalar.h), under the rules of leaf_pairs.inl.
 
 #include "traverse/leaf_edge_faces.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Features of a leaf beside a box: of which corners lie beyond it, and on which of its sides (outcodes, Cohen and
-// Sutherland), follows which features do: those all of whose corners lie beyond one side. Sixteen corners are compared
-// at a time, and boxes of the features beside it are never made. Part of leaf_pairs.inl and leaf_edge_faces.inl.
+// Finds the features of a leaf that lie beyond one side of a box. Outcodes (Cohen and Sutherland) tell which corners
+// lie beyond which side; a feature is outside if all its corners lie beyond the same side. Sixteen corners are
+// compared at a time, and boxes of the features are never built. Part of leaf_pairs.inl and leaf_edge_faces.inl.
 
 HPCCD_HD constexpr std::uint32_t low(std::uint32_t end, std::uint32_t axis) {
   return bound_number(end, Side::low, axis);

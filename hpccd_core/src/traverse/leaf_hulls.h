@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether two leaves are certainly farther apart than a distance: by directions along which all their corners are.
+// Decides whether two leaves are certainly farther apart than a distance, by directions that separate all their
+// corners.
 #pragma once
 
 #include "bvh/tree.h"

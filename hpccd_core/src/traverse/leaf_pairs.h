@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Candidate feature pairs of two leaves: boxes overlap and no vertex is shared.
+// Candidate feature pairs of two leaves: pairs with overlapping boxes and no common vertex.
 #pragma once
 
 #include "bvh/tree.h"

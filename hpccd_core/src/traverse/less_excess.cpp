@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The traversal where boxes of some pairs of meshes have grown by more than they ask for (excess.h).
+// The traversal for scenes in which the boxes of some pairs of meshes have grown more than their separation requires
+// (excess.h).
 #include <algorithm>
 
 #include "traverse/boxes_until.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pairs of meshes that the scene enables, numbered, so that what is kept of each takes no room for the others.
+// The enabled pairs of meshes, numbered, so that data per pair takes no memory for disabled ones.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far apart two meshes are at most, from a look at few of their vertices.
+// An upper bound on the distance of two meshes, from a few of their vertices.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Branch and bound for the smallest distance of each pair of meshes: the nearest pair of features so far, and what it
-// leaves to be looked at. Shared by all threads.
+// Branch and bound for the smallest distance of each pair of meshes: the nearest pair of features so far, and which
+// pairs it leaves to be searched. Shared by all threads.
 #pragma once
 
 #include <algorithm>

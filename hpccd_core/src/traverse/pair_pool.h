@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Node pairs that wait for a thread. Threads walk depth first with a stack of their own; one that has run dry says so,
-// and the others give away the older half of their stacks, which holds the larger subtrees. So the list to begin with
-// can be short (making it is serial work), and no thread stays idle while another has something to share.
+// Node pairs that wait for a thread. Each thread traverses depth first with its own stack. A thread that runs out of
+// work announces it, and the others give away the older half of their stacks, which holds the larger subtrees. The
+// initial list can therefore be short (creating it is serial work), and no thread stays idle while another has work to
+// share.
 #pragma once
 
 #include <atomic>

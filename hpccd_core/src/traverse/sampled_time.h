@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The time of work that is too short to be timed each time: to look at the clock twice takes a quarter of what a pair
-// of leaves does. One time of 64 is timed and stands for all; where it begins, the clock is looked at twice, which
-// tells what a look takes.
+// The time of work that is too short to be timed each time: two readings of the clock cost a quarter of a pair of
+// leaves. One in 64 is timed and represents all. At its start the clock is read twice, which measures the cost of a
+// reading.
 #pragma once
 
 #include <chrono>

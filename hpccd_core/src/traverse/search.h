@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What all threads share during one call, and a type for each query. The type sets which boxes overlap (traverse),
-// which pairs of features of two leaves are candidates (test_leaves), their batch tests and fallbacks, and where
-// results go (take). Batches and threads are the same for all.
+// The state that all threads share during one call, and a type for each query. The type defines which boxes overlap
+// (traverse), which pairs of features of two leaves are candidates (test_leaves), their batch tests and fallbacks, and
+// where results go (take). Batches and threads are the same for all queries.
 #pragma once
 
 #include <atomic>

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Features of two leaves that have a vertex in common: they are no candidates. Most pairs of leaves are neighbours on a
-// mesh (60 to 80 % on the published scenes), so what they share is found once, not feature by feature. Without
-// branches: which corners are shared no processor can guess. Part of leaf_pairs.inl and leaf_edge_faces.inl.
+// Features of two leaves that share a vertex: they are not candidates. Most pairs of leaves are neighbours on a mesh
+// (60 to 80 % on the published scenes), so shared vertices are found once per pair of leaves, not per pair of
+// features. The code is branch-free, since which corners are shared is unpredictable. Part of leaf_pairs.inl and
+// leaf_edge_faces.inl.
 
 #include "traverse/leaf_features.inl"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The traversal cut into independent tasks: pairs of nodes (or one node with itself) split until there are enough to
-// keep every thread busy. The list depends on the tree only, never on the number of threads.
+// Divides the traversal into independent tasks: pairs of nodes (or one node with itself) are split until there are
+// enough to keep every thread busy. The list depends on the tree only, never on the number of threads.
 #pragma once
 
 #include <vector>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The walk over pairs of nodes, in two forms: over all of them, or until any contact is found. Included in an unnamed
-// namespace of several sources: the number of box types in a source affects how much of the walk the compiler inlines,
-// and three more of them in one source cost each of the others a tenth.
+// The traversal of node pairs, in two forms: of all pairs, or until any contact is found. It is included in an unnamed
+// namespace of several sources: the number of box types in a source affects how much of the traversal the compiler
+// inlines, and three more types in one source slowed down each of the others by a tenth.
 
 const Block& block_of(const Tree& tree, std::uint32_t node) {
   return tree.blocks[tree.block_of_leaf[tree.nodes[node].leaf]];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What one thread carries through the traversal: candidates wait in small buffers until a batch is full, are tested,
-// and only contacts stay. Candidates are never all kept.
+// The state of one thread during the traversal. Candidates wait in small buffers until a batch is full, are tested,
+// and only contacts remain. Candidates are never all stored.
 #pragma once
 
 #include <memory>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What kernels are written against (scalar.h), with AVX2.
+// The interface of kernels (scalar.h), implemented with AVX2.
 #pragma once
 
 #include <immintrin.h>

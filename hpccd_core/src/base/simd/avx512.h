@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What kernels are written against (scalar.h), with AVX-512 F, DQ, BW and VL.
+// The interface of kernels (scalar.h), implemented with AVX-512 F, DQ, BW and VL.
 #pragma once
 
 #include <immintrin.h>

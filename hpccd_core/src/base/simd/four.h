@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Four floats at a time (GCC/Clang vector extension): what every 64-bit processor has, and may be used everywhere but
+// Four floats at a time (GCC/Clang vector extension). Every 64-bit processor supports them; usable everywhere except
 // on a GPU.
 #pragma once
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Masks of lanes in registers of sixteen bytes. The sets that have such share these lane types, and so what is
-// instantiated with them: it must be the same in all of them.
+// Masks of lanes in 16-byte registers. Instruction sets with such registers share these lane types and all
+// instantiations with them, so the code must be the same in all of them.
 #pragma once
 
 #include "base/simd/four.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What kernels are written against (scalar.h), with NEON. Its arithmetic is that of the compiler's vectors, which every
-// aarch64 has; what these do number by number, and NEON at once, is here.
+// The interface of kernels (scalar.h), implemented with NEON. Arithmetic uses the compiler's vectors, which every
+// aarch64 supports. This file contains what these compute element by element and NEON computes at once.
 #pragma once
 
 #include <arm_neon.h>

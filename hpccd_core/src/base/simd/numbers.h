@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For instruction sets that have no instruction for it.
+// Replacements for instructions that an instruction set lacks.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What kernels are written against, here with what every machine has. Kernels (*.inl) are compiled once for each
-// instruction set, after its header: avx2.h, avx512.h and neon.h define the same names, and every set gives the same
-// bits. All of it is inlined: a function compiled for one set must not be linked into code for another.
+// The interface of kernels, implemented for every machine. Kernels (*.inl) are compiled once for each instruction set,
+// after its header: avx2.h, avx512.h and neon.h define the same names, and results are bit-identical. Everything is
+// inlined: a function compiled for one set must not be linked into code for another.
 #pragma once
 
 #include <bit>

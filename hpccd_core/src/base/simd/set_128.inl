@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What kernels are written against (scalar.h), with registers of sixteen bytes: as far as the compiler's own vectors
-// go. Part of scalar.h and neon.h, which have bits16() before it and Bytes16 behind it.
+// The interface of kernels (scalar.h) for 16-byte registers, as far as the compiler's own vectors implement it. Part
+// of scalar.h and neon.h, which define bits16() before it and Bytes16 after it.
 
 // Real numbers in lanes, with the operations of real.h: so many doubles, and twice as many floats. Two and four are
 // what every 64-bit processor has registers for. Where a number stands alone g++ makes branches of `select`, and what

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Functions that are compiled once for each instruction set: their declarations, and the choice among them.
+// Functions that are compiled once for each instruction set: their declarations and the dispatch among them.
 #pragma once
 
 #include "hpccd/options.h"

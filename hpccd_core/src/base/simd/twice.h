@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two registers of lanes side by side, for arithmetic whose steps wait for each other: while one is at its division, so
-// is the other.
+// Two registers of lanes side by side, for arithmetic with long dependency chains: while one waits for its division,
+// the other one computes.
 #pragma once
 
 #include "base/simd/lanes.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Included once per instruction set, after its header (base/simd/scalar.h). As batch.inl, uses nothing from the
-// standard library at run time.
+// Included once per instruction set, after its header (base/simd/scalar.h). Like batch.inl, must not use the standard
+// library at run time.
 
 #include "base/simd/twice.h"
 #include "elementary/distance/distance_batch.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The separation test once more with 106 bits: for what double precision leaves undecided, because features approach
-// each other slowly or pass each other at a distance very near the separation.
+// The separation test with 106 bits of precision, for pairs that double precision leaves undecided because the
+// features approach each other slowly, or pass each other at a distance very close to the separation.
 #pragma once
 
 #include "elementary/distance/separation_test.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What rounding can do to a computed distance.
+// Bounds on the rounding errors of computed distances.
 #pragma once
 
 #include "elementary/coplanarity.h"

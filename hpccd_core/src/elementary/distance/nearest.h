@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nearest points of two features at one moment. In p, a and b of motion.h the vector from a point of the face to the
-// vertex, or from a point of edge a to one of edge b, is gap(x, y) = p - x a - y b; x and y range over the triangle
-// x, y >= 0, x + y <= 1, or over the square 0 <= x <= 1, -1 <= y <= 0.
+// Nearest points of two features at one time. In terms of p, a and b of motion.h, the vector from a point of the face
+// to the vertex, or from a point of edge a to one of edge b, is gap(x, y) = p - x a - y b. (x, y) ranges over the
+// triangle x, y >= 0, x + y <= 1, or over the square 0 <= x <= 1, -1 <= y <= 0.
 #pragma once
 
 #include "elementary/inside.h"

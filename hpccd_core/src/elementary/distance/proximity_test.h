@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether two features are within d of each other at one moment, and how far apart they are.
+// Decides whether two features are within d of each other at one time, and computes their distance.
 #pragma once
 
 #include "elementary/distance/margins.h"

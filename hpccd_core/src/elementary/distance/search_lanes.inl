@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Searches for the earliest time within a separation, of many pairs in lanes. Pairs take from 2 to 33 steps, 6.6 of
-// them on average where a ball spins under a cloth, and the last of eight 11.2. So where few of a group still run, they
-// are left where they are, and go on together with those of other groups. Part of distance_batch.inl.
+// Searches for the earliest time within a separation, for many pairs in lanes. A pair takes 2 to 33 steps (6.6 on
+// average for a ball that spins under a cloth), and the slowest of eight 11.2. When few pairs of a group are still
+// running, they are set aside and later continued together with those of other groups. Part of distance_batch.inl.
 
 // SeparationsOf: of lanes by their numbers in the list.
 template <Kind kind, class SeparationsOf>

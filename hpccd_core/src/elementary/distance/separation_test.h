@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The earliest time at which two features come within d > 0 of each other, by steps that are certified. At two times
-// one looks for the direction of the gap; between them it is turned linearly from one to the other. Along it the
-// difference of two corners is quadratic in time, and its Bernstein coefficients bound it: where all of them stay above
-// d the features are farther apart than d in between, whatever lies between. Times are tried as Newton's method for the
-// distance proposes. That the features do come within d is proven by two points of them. Parallel edges and needles
-// need no case of their own: the direction of a gap is always well defined.
+// The earliest time at which two features come within d > 0 of each other, found by certified steps. The test computes
+// the direction of the gap at two times and interpolates it linearly between them. Along this direction the difference
+// of two corners is quadratic in time, and its Bernstein coefficients bound it: if all of them are above d, the
+// features are farther apart than d during the whole interval. Newton's method on the distance proposes the times. A
+// hit is proven by two points of the features that are within d. Parallel edges and needles need no special case: the
+// direction of a gap is always well defined.
 #pragma once
 
 #include "elementary/distance/margins.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far apart two features shall stay, by their meshes.
+// The minimum separation of two features, looked up by their meshes.
 #pragma once
 
 #include <cstdint>

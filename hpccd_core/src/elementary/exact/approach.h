@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From which side the features come together, in integers of one type: the sign that f = p . n has just before their
+// The side from which the features approach each other, in integers of one type: the sign of f = p . n just before the
 // contact, and n at the contact.
 #pragma once
 

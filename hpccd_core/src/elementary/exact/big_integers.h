@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Integers of any size, for the widest coordinates; on CPUs.
+// Integers of any size, for coordinates with the widest range of exponents. CPUs only.
 #pragma once
 
 #include <bit>

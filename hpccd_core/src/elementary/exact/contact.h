@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The exact tier's fallback: the earliest contact of one vertex-face or edge-edge query in integer arithmetic; and
-// from which side its features come.
+// The fallback of the exact tier: the earliest contact of one vertex-face or edge-edge query in integer arithmetic,
+// and the side from which its features approach each other.
 #pragma once
 
 #include <optional>

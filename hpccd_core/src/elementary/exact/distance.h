@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Euclidean distances between the closed features of one vertex-face or edge-edge query at rest, in integers. Features
-// that are degenerate are the segments or points that they are.
+// Euclidean distances between the closed features of one vertex-face or edge-edge query at rest, in integers.
+// Degenerate features are treated as the segments or points that they are.
 #pragma once
 
 #include "elementary/motion.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From which side features come, in integers of one and two limbs: on CPUs and devices.
+// The side from which features approach each other, in integers of one and two limbs. On CPUs and devices.
 #pragma once
 
 #include "elementary/exact/approach.h"

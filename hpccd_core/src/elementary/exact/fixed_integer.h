@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Signed integers of a fixed number of 64-bit limbs, in two's complement. A product is as wide as both factors
-// together, so it cannot overflow; a sum is as wide as its wider term, and its user leaves room for it.
+// together, so it cannot overflow. A sum is as wide as its wider term; the caller must leave room for it.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The gap between two moving features, computed from the motion as given: positions at one time are rounded, and a
-// short gap between rounded positions is mostly rounding.
+// The gap between two moving features, computed from the given motion. Positions at one time are rounded, and a short
+// gap between rounded positions consists mostly of rounding errors.
 #pragma once
 
 #include "elementary/motion.h"

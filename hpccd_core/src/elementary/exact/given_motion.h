@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A query's coordinates at both ends of the step, on their way to integers.
+// The coordinates of a query at both ends of the step, before their conversion to integers.
 #pragma once
 
 #include <algorithm>

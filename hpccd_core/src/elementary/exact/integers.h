@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Coordinates as integers: those of one query by a power of two, one for each axis.
+// Coordinates as integers: the coordinates of one query times a power of two, one for each axis.
 #pragma once
 
 #include <bit>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether an edge pierces or touches a face in one snapshot, in integer arithmetic.
+// Decides whether an edge intersects or touches a face in one snapshot, in integer arithmetic.
 #pragma once
 
 #include "base/vec3.h"

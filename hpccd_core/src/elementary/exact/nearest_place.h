@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The nearest parts of two features at rest (resting.h): their places, and their distance.
+// The nearest parts of two features at rest (resting.h): their positions and their distance.
 #pragma once
 
 #include <cmath>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// How two features can be as near as d: as a plane and a point or two lines, a line and a point, or two points. Each is
-// a polynomial in t, the squared distance less d^2 times what makes it one, and others that tell where it counts.
+// The ways in which two features can be at distance d: a plane and a point or two lines, a line and a point, or two
+// points. Each is a polynomial in t (the squared distance minus d^2, times its denominator) and further
+// polynomials whose signs tell when it applies.
 //
 // Bits, for coordinates of b bits (query.h): n . n and the other conditions have at most 4 b + 13, sums of three of
 // them 4 b + 15, f^2 has 6 b + 20.

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// All polynomials whose signs decide whether the features touch at a time at which f = p . (a x b) vanishes.
+// The polynomials whose signs decide whether the features touch at a root of f = p . (a x b).
 //
-// Bits, for coordinates of b bits: a difference's coefficients have b + 1 and b + 2, a cross product's 2 b + 3, 2 b + 5
-// and 2 b + 5, sums of three of them at most 2 b + 7; f's at most 3 b + 10.
+// Bits, for coordinates of b bits: a difference's coefficients have b + 1 and b + 2, a cross product's 2 b + 3, 2 b +
+// 5 and 2 b + 5, sums of three of them at most 2 b + 7; f's at most 3 b + 10.
 #pragma once
 
 #include <optional>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The features of one query at rest, in integers of one type: which of their parts are nearest, and how far apart.
+// The features of one query at rest, in integers of one type: their nearest parts and the distance.
 //
 // Bits, for coordinates of b bits: a difference has b + 1, a scalar product 2 b + 4, a coordinate of a vector product
 // 2 b + 3; products of two such vectors 4 b + 8; f 3 b + 6; f^2 and its like at most twice as many.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far double precision gets with the first root of a polynomial at which others are positive. Their Bernstein
-// coefficients are computed in integers and then rounded; from there on all errors are bounded.
+// The first root of a polynomial at which other polynomials are positive, in double precision where that suffices.
+// Bernstein coefficients are computed in integers and then rounded; all errors after that are bounded.
 #pragma once
 
 #include <limits>

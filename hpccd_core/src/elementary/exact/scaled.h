@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The coordinates of a query over one power of two for all axes, as Euclidean distances ask for; and a distance.
+// The coordinates of a query times one power of two for all axes, as Euclidean distances require; and a distance.
 #pragma once
 
 #include "elementary/exact/boxes.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// When the features of one vertex-face or edge-edge query come within a distance, in integers.
+// The earliest time at which the features of one vertex-face or edge-edge query come within a distance, in integers.
 #pragma once
 
 #include <optional>

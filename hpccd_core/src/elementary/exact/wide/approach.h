@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From which side the features come together, in integers of any size: never undecided, and in about the same time
-// whatever the numbers are.
+// The side from which the features approach each other, in integers of any size. Never undecided; the time hardly
+// depends on the numbers.
 #pragma once
 
 #include "elementary/exact/approach.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Polynomials in t with integer coefficients of any size: values, parts of the step, remainders.
+// Polynomials in t with integer coefficients of any size: values, restriction to a part of the step, remainders.
 #pragma once
 
 #include <span>

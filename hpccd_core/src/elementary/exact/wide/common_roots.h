@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What two polynomials have in common; of any degree.
+// Greatest common divisors of two polynomials of any degree.
 #pragma once
 
 #include "elementary/exact/wide/part.h"

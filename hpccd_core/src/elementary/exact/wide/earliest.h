@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The earliest contact of a query in integers of any size: never undecided, and in about the same time whatever the
-// numbers are.
+// The earliest contact of a query in integers of any size. Never undecided; the time hardly depends on the numbers.
 #pragma once
 
 #include "elementary/exact/earliest.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The first root of a polynomial at which others have the sign that they must.
+// The first root of a polynomial at which other polynomials have the required signs.
 #pragma once
 
 #include <optional>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A part of the step and a polynomial seen there: as one in s, which goes from 0 to 1 on it.
+// A part of the step, and a polynomial on it in the variable s, which goes from 0 to 1 over the part.
 #pragma once
 
 #include <vector>

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A real root in [0, 1] of an integer polynomial, as narrow as anyone asks. Coordinates may lie 1500 binary orders
-// apart and roots thousands of bits from one another, so no step here gains a fixed number of bits: a root's distance
-// from its neighbours is found by its exponent first, then every step doubles the bits that are known. And since such
-// roots come in crowds, what is computed with is the offset from a base nearby: few bits, where the root itself has
-// thousands.
+// A real root in [0, 1] of an integer polynomial, to any precision. Coordinates may differ by 1500 binary orders of
+// magnitude and roots by thousands of bits, so no step gains a fixed number of bits: the exponent of the distance to
+// the neighbouring roots is found first, then every step doubles the known bits. Since such roots form clusters,
+// computations use the offset from a nearby base, which has few bits where the root has thousands.
 #pragma once
 
 #include <vector>
