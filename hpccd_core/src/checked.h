@@ -8,11 +8,11 @@
 
 namespace hpccd {
 
-// The scene again. Throws InvalidArgument where it is null, or an option is out of its range; what depends on the
-// machine or the scene is refused where it is used.
+// Returns the scene. Throws InvalidArgument if it is null, or if an option is out of range; options that depend on the
+// machine or the scene are checked where they are used.
 std::shared_ptr<const Scene> checked(std::shared_ptr<const Scene> scene, const Options& options);
 
-// Throws InvalidArgument where there is a number of rows, but no memory that holds them.
+// Throws InvalidArgument if there are rows but no memory.
 void check_memory(const char* name, Positions vertices);
 
 }  // namespace hpccd

@@ -20,8 +20,8 @@
 namespace hpccd {
 namespace {
 
-// The communication thread of the hybrid waits actively: on a core that the pool uses it would hold up a thread that
-// all others then wait for (a quarter of a frame of 1 ms).
+// The communication thread of the hybrid spins: on a core that the pool uses it would delay one thread, for which all
+// others then wait (a quarter of a frame of 1 ms).
 int pool_threads(const Options& o) {
   const int cores = static_cast<int>(std::thread::hardware_concurrency());
   if (o.backend != Backend::hybrid || cores < 2 || (o.threads > 0 && o.threads < cores)) return o.threads;
@@ -38,25 +38,25 @@ struct Detector::Impl {
         engine(std::make_unique<Engine>(common)),
         takes_device_arrays(engine->backends.take_device_arrays()) {}
 
-  std::shared_ptr<Impl> left_alone;  // itself, where nobody may touch it any more
+  std::shared_ptr<Impl> left_alone;  // itself, if no thread may touch it any more
 
-  // All that calls keep from one to the next.
+  // All state that is kept from call to call.
   struct Engine {
     explicit Engine(Common& common) : shared(common, common.pool), backends(shared) {}
     Resources shared;
     AvailableBackends backends;
   };
 
-  // All that a call changes is one call's at a time. Only these two are not:
+  // State that a call changes is protected by its turn, except these two:
   std::atomic<Backend> last_backend{Backend::cpu};
   Cancellation& cancellation() { return common.cancellation; }
 
   mutable OneCall one_call;
   Common common;
-  std::unique_ptr<Engine> engine;  // none after a call that ended unforeseen, as where memory ended
+  std::unique_ptr<Engine> engine;  // empty after a call that ended unexpectedly, for example without memory
   const bool takes_device_arrays;
   Tuner tuner;
-  // Of the last call. Its other counts stay where they were made until somebody asks.
+  // Results of the last call. Its other counts are collected when they are requested.
   std::optional<Counts> found;
   Backend asked = Backend::cpu;  // which may have left the rest to the CPU
 
@@ -64,8 +64,8 @@ struct Detector::Impl {
   AvailableBackends& backends() { return engine->backends; }
   Profiler& profiler() { return engine->shared.profiler; }
 
-  // One call, from its turn to its end. What is kept may be half of what it should be where something is thrown that
-  // no check foresees: then the next call begins as the first did.
+  // One call, from its turn to its end. An unexpected exception may leave the kept state incomplete: then the next call
+  // starts from scratch.
   template <class Answer>
   auto call(Answer&& answer) {
     common.pool.require_threads();
@@ -110,7 +110,7 @@ struct Detector::Impl {
       throw InvalidArgument("vertices_t0, vertices_t1: must both be float32 or both be float64; convert one of them");
   }
 
-  // Its rows are on the device, where the host cannot read them.
+  // Throws if results are on the device, where the host cannot read them.
   void require_results_on_host(const char* remedy) const {
     if (options().results_on_device)
       throw InvalidArgument("results_on_device: this detector leaves its results on the device; call " +
@@ -127,7 +127,7 @@ struct Detector::Impl {
     return tuner.next(usable);
   }
 
-  // Whether rows may be given out where a GPU has written them.
+  // Whether results may be returned in the memory that a GPU has written.
   bool gives_in_place(Backend picked) const {
     const Options& o = options();
     return picked == Backend::gpu && o.worlds == 1 && !o.points && !o.normals && !o.closest;
@@ -163,7 +163,8 @@ struct Detector::Impl {
     });
   }
 
-  // A query of a motion, or of a snapshot given twice: where it is offered and works, else on the CPU.
+  // A query of a motion, or of a snapshot given twice: on the selected backend if it supports the query and works,
+  // otherwise on the CPU.
   template <class Query>
   auto ask(Positions t0, Positions t1, Query&& query) {
     return call([&] {
@@ -181,8 +182,8 @@ struct Detector::Impl {
     });
   }
 
-  // Where results stay on the device. at_once(backend): there, or nothing where it failed; then what the CPU answers is
-  // brought there.
+  // For results on the device. at_once(backend) computes them there and returns nothing if it failed; then the CPU
+  // computes them and they are copied.
   template <class AtOnce, class OnHost, class Count>
   DeviceResults on_device(Positions t0, Positions t1, AtOnce&& at_once, OnHost&& on_host, Count&& count) {
     if (!options().results_on_device)
@@ -228,7 +229,7 @@ Detector::Detector(std::shared_ptr<const Scene> scene, Options options)
         return std::make_shared<Impl>(std::move(scene), options);
       }()) {}
 
-// In a child made by fork() the memory of a call that was under way is in the middle of a change: better left alone.
+// In a child made by fork(), the memory of a call that was running is inconsistent: it is not freed.
 Detector::~Detector() {
   if (impl_->one_call.abandoned()) impl_->left_alone = impl_;
 }

@@ -11,7 +11,7 @@
 namespace hpccd {
 
 struct ByIntegers {
-  // q: where the vertices are at the time asked for.
+  // q_t0, q_t1: the vertices at the given time.
   exact::Nearest nearest(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4],
                          const Vec3<double> q[4]) const {
     return exact::nearest(kind, q, kind == Kind::edge_edge && exact::stay_parallel(q_t0, q_t1));
@@ -25,7 +25,7 @@ struct ByIntegers {
   }
 };
 
-// What was answered with means nothing once anything is open, here and below.
+// Leaves the row open. Once a row is open, all other results for it, here and below, are meaningless.
 struct LeftOpen {
   bool open = false;
 
@@ -43,7 +43,7 @@ struct LeftOpen {
   }
 };
 
-// As exact::approach, up to where that goes on to integers of any size.
+// Like exact::approach, but without integers of any size.
 struct ByFixedIntegers {
   bool open = false;
 

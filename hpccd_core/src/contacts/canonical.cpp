@@ -9,13 +9,13 @@
 namespace hpccd {
 namespace {
 
-// What one thread adds up, on a cache line of its own.
+// Partial sums of one thread, on a cache line of its own.
 struct alignas(64) Summary {
   std::uint64_t hash = 0;
   double first_toc = std::numeric_limits<double>::infinity();
 };
 
-// Pieces of the work on contacts: 1 ms where points and normals are asked for.
+// Contacts per piece of work: 1 ms if points and normals are requested.
 constexpr std::size_t some = 4096;
 
 void keep_earliest(std::vector<Worker>& workers, const Cancellation& cancellation) {
@@ -32,7 +32,7 @@ void keep_earliest(std::vector<Worker>& workers, const Cancellation& cancellatio
     }
 }
 
-// Writes contact i of n vertex-face contacts and then edge-edge ones.
+// Writes contact i into the result of n vertex-face contacts followed by edge-edge contacts.
 void write(Contacts& c, std::size_t n, std::size_t i, const Contact& f, const Geometry& geometry, Outputs outputs,
            Summary& sum) {
   const Kind kind = i < n ? Kind::vertex_face : Kind::edge_edge;
@@ -59,7 +59,7 @@ void collect_contacts(std::vector<Worker>& workers, const Geometry& geometry, Re
   std::size_t n = 0, m = 0;
   for (const Worker& w : workers) n += w.vertex_face.size(), m += w.edge_edge.size();
 
-  // New memory comes page by page from the system, which takes as long as the sorting: each array on its own thread.
+  // New memory is mapped page by page, which takes as long as the sorting: each array is filled by its own thread.
   order.distribute(workers, pool, 7, [&](std::size_t array) {
     switch (array) {
       case 0:

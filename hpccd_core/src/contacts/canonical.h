@@ -11,8 +11,8 @@
 
 namespace hpccd {
 
-// Takes what the workers found into contacts that hold nothing yet; where this is cancelled, they hold anything.
-// Features are numbered so that their pairs sort into the canonical order. `order` keeps its memory from call to call.
+// Moves the workers' contacts into `contacts`, which must be empty; after a cancellation the contents are unspecified.
+// Features are numbered so that their pairs sort into canonical order. `order` keeps its memory from call to call.
 void collect_contacts(std::vector<Worker>& workers, const Geometry& geometry, Report report, Outputs outputs,
                       ContactOrder& order, ThreadPool& pool, Contacts& contacts);
 

@@ -8,7 +8,7 @@
 
 namespace hpccd {
 
-// Of vertices as in motion.h, which it keeps by address.
+// Keeps references to the vertices, which are in the order of motion.h.
 template <Kind kind>
 class ContactPoint {
   using V = Vec3<double>;
@@ -27,22 +27,22 @@ class ContactPoint {
     const Magnitudes<double> size{greater(largest(m_.p1), largest(m_.p0)), greater(largest(m_.a1), largest(m_.a0)),
                                   greater(largest(m_.b1), largest(m_.b0))};
     product_ = size.p * size.a * size.b;
-    // Below this sine of the angle between a and b, relative to their largest lengths in the step, the roundings of n
-    // (20 u) are no longer small beside it.
+    // If the sine of the angle between a and b, relative to their largest lengths in the step, is below this, rounding
+    // errors of n (20 u) are no longer small compared with n.
     constexpr double flat = 1e-6;
     regular_ = in_range(size) && largest(n_) > flat * (size.a * size.b);
   }
 
-  // The vertex; or on the shorter edge where the other crosses it, in the middle of what they share where they are
-  // parallel. Neither names nor their order matter to this or the normal.
+  // The vertex; or the point of the shorter edge where the other one crosses it; for parallel edges the middle of their
+  // overlap. The numbering of vertices and the order of edges affect neither this nor the normal.
   HPCCD_HOST_DEVICE V point() const {
     if constexpr (kind == Kind::vertex_face) return at(0);
     return crossing();
   }
 
-  // Unit length, at toc: of the face towards the side on which the vertex is just before toc, or a x b from a towards
-  // the side on which b is then. With contact at t = 0 just before it is where the straight-line motion would have come
-  // from. Zero where there is no such side, because the motion is coplanar throughout, or no direction, because
+  // Unit length, at toc: perpendicular to the face, towards the side of the vertex just before toc, or a x b, from a
+  // towards the side of b just before toc. For a contact at t = 0, "just before" refers to the straight-line motion
+  // continued backwards. Zero if there is no side, because the motion is coplanar throughout, or no direction, because
   // features are degenerate or parallel at toc.
   template <class Arbiter>
   HPCCD_HOST_DEVICE V normal(Arbiter& arbiter) const {
@@ -54,22 +54,23 @@ class ContactPoint {
  private:
   HPCCD_HD V at(int i) const { return interpolate(t0_[i], t1_[i], t_); }
 
-  // The side of n on which p is just before the contact; 0: not certain. With f = p . n and M = |p||a||b|, |f| <= 6 M,
-  // |f'| <= 36 M, |f''| <= 144 M; counting roundings as in coplanarity.h, f is known to 108 u M and f' to 600 u M.
+  // The side of n on which p is just before the contact; 0: not certain. With f = p . n and M = |p||a||b|: |f| <= 6 M,
+  // |f'| <= 36 M, |f''| <= 144 M. Counting rounding errors as in coplanarity.h, f is known to 108 u M and f' to 600 u
+  // M.
   HPCCD_HD int certain_side() const {
     const double f = dot(p_, n_), error = 1.5e-14 * product_;
     const V da = m_.a1 - m_.a0, db = m_.b1 - m_.b0;
     const double slope = dot(m_.p1 - m_.p0, n_) + dot(p_, cross(da, b_) + cross(a_, db));
-    // The root of f that belongs to the contact lies within the rounding of its time, or, in the tiers that promise no
-    // time, about f / f' away. Up to twice as far (Kantorovich) f' shall keep its sign: then f comes from the other
-    // side.
+    // The root of f that belongs to the contact is within the rounding error of its time; in tiers that do not promise
+    // times, about f / f' away. If f' keeps its sign up to twice as far (Kantorovich), f comes from the opposite side.
     constexpr double time_error = 4e-12;
     const double steep = fabs(slope) - 1.2e-13 * product_;
     if (!(steep > 0 && steep * steep > 150 * product_ * (time_error * steep + 2 * (fabs(f) + error)))) return 0;
     return slope < 0 ? 1 : -1;
   }
 
-  // On the shorter edge: what is within rounding of it need not be within 1e-9 of its length on the longer one.
+  // On the shorter edge: a point within rounding errors of it need not be within 1e-9 of the longer edge's length on
+  // that one.
   HPCCD_HOST_DEVICE V crossing() const {
     const double size_a = largest(a_), size_b = largest(b_);
     const bool a_shorter = size_a < size_b;
@@ -77,7 +78,7 @@ class ContactPoint {
     if (regular_) {
       const double per_nn = 1 / nn_;
       const double on_a = clamped(per_nn * dot(cross(p_, b_), n_)), on_b = clamped(per_nn * dot(cross(p_, a_), n_));
-      // What is left across both is no matter of the places.
+      // A gap perpendicular to both edges does not affect the point.
       const V gap = p_ + on_b * b_ - on_a * a_, along = gap - (per_nn * dot(gap, n_)) * n_;
       if (largest(along) <= 1e-10 * greater(size_b, size_a)) return on_shorter(a_shorter ? on_a : on_b);
     }
@@ -90,8 +91,8 @@ class ContactPoint {
   Motion<double> m_;
   V p_, a_, b_, n_;  // at the time of contact: as in motion.h, and a x b
   double nn_;        // |n|^2
-  double product_;   // |p||a||b|, the largest of the step in the maximum norm
-  bool regular_;     // doubles hold all products, and n is known well
+  double product_;   // |p||a||b|, the largest values of the step in the maximum norm
+  bool regular_;     // doubles can hold all products, and n is accurate
 };
 
 }  // namespace hpccd

@@ -20,7 +20,7 @@ using V = Vec3<double>;
 
 std::array<double, 3> point_of(const V& v) { return {v.x, v.y, v.z}; }
 
-// b - a without rounding, times 2^-exponent.
+// (b - a) * 2^-exponent, without rounding.
 Vec3<DoubleDouble> spanned(const V& a, const V& b, int exponent) {
   const auto along = [&](double from, double to) {
     const DoubleDouble d = detail::two_sum(to, -from);
@@ -31,8 +31,8 @@ Vec3<DoubleDouble> spanned(const V& a, const V& b, int exponent) {
 
 int exponent_of(double size) { return size > 0 ? std::ilogb(size) : 0; }
 
-// Where on the edge the plane of the face is, with 106 bits: a double knows the normal of a needle too badly. NaN where
-// the edge lies in that plane, or the face has none.
+// The position on the edge where it meets the plane of the face, with 106 bits: the normal of a needle is too
+// inaccurate in double precision. NaN if the edge lies in that plane, or if the face has none.
 double place_in_plane(const V q[5], double size) {
   const V &origin = q[2], &first = q[3], &second = q[4];
   const Vec3<DoubleDouble> n = cross(spanned(origin, first, exponent_of(largest(first - origin))),
@@ -42,8 +42,8 @@ double place_in_plane(const V q[5], double size) {
   return (before / (before - after)).high;
 }
 
-// Where an edge meets a face: in the plane of the face, if that is known well enough; else at one of its ends, or where
-// it meets an edge of the face.
+// Where an edge meets a face: in the plane of the face, if that is accurate enough; otherwise at one end of the edge,
+// or where it meets an edge of the face.
 exact::Nearest meeting_place(const V q[5]) {
   const double size = std::max(largest(q[0] - q[2]), largest(q[1] - q[2]));
   const double place = place_in_plane(q, size);

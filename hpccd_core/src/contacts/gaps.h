@@ -8,7 +8,7 @@
 
 namespace hpccd {
 
-// One for each pair, in their order. Throws Cancelled.
+// One gap for each pair, in their order. Throws Cancelled.
 std::vector<Gap> collect_gaps(const NearestPairs& nearest, const Geometry& geometry, const Cancellation& cancellation);
 
 }  // namespace hpccd

@@ -11,7 +11,7 @@
 
 namespace hpccd {
 
-// Finaliser of MurmurHash3 (public domain constants): every input bit reaches every output bit.
+// Finaliser of MurmurHash3 (public domain constants): every input bit affects every output bit.
 HPCCD_HD std::uint64_t mix(std::uint64_t x) {
   x ^= x >> 33, x *= 0xff51afd7ed558ccdULL;
   x ^= x >> 33, x *= 0xc4ceb9fe1a85ec53ULL;
@@ -28,12 +28,12 @@ HPCCD_HD std::uint64_t salt_of(Kind kind) {
   return kind == Kind::edge_edge ? 0x9e3779b97f4a7c15ULL : kind == Kind::vertex_face ? 1 : 0xd1b54a32d192ed03ULL;
 }
 
-// a, b: vertex and face, both edges, or edge and face; an edge is first vertex << 32 | second vertex.
+// a, b: vertex and face, both edges, or edge and face. An edge is given as first vertex << 32 | second vertex.
 HPCCD_HD std::uint64_t hash_of(Kind kind, std::uint64_t a, std::uint64_t b, double toc) {
   return mix(mix(mix(a + salt_of(kind)) ^ b) ^ bits_of(toc));
 }
 
-// What the hash of a world counts in the hash of all: the same answers in other worlds are another answer.
+// The weight of a world's hash in the total hash: the same contacts in another world give another hash.
 HPCCD_HD std::uint64_t hash_weight(std::uint64_t world) { return 2 * world + 1; }
 
 HPCCD_HD std::uint64_t pack(std::uint32_t high, std::uint32_t low) { return (std::uint64_t{high} << 32) | low; }

@@ -9,12 +9,13 @@
 
 namespace hpccd {
 
-// max_norm by instructions rather than by comparisons, whose outcomes no processor can predict.
+// max_norm without comparisons, whose outcomes are unpredictable branches.
 HPCCD_HD double largest(Vec3<double> v) { return greater(fabs(v.z), greater(fabs(v.y), fabs(v.x))); }
 
 HPCCD_HD double clamped(double place) { return lesser(1.0, greater(0.0, place)); }
 
-// Scaled first, so that lengths near the ends of the number range survive being squared. Zero stays zero.
+// Scaled first, so that lengths near the ends of the number range do not overflow or underflow when squared. Zero stays
+// zero.
 HPCCD_HD Vec3<double> unit(Vec3<double> v) {
   const double most = largest(v);
   if (!(most > 0)) return {0, 0, 0};
@@ -27,7 +28,7 @@ struct Segment {
   HPCCD_HD Vec3<double> at(double place) const { return start + place * along; }
 };
 
-// The place of the segment nearest to x. The length divides on its own: its square may underflow.
+// The position on the segment nearest to x. Divides by the length twice: its square may underflow.
 HPCCD_HOST_DEVICE inline double nearest_place(const Segment& s, Vec3<double> x) {
   const double size = largest(s.along);
   if (!(size > 0)) return 0;
@@ -35,11 +36,11 @@ HPCCD_HOST_DEVICE inline double nearest_place(const Segment& s, Vec3<double> x) 
   return clamped(dot(x - s.start, u) / dot(u, u) / size);
 }
 
-// The place on `longer`, which is no point, where the lines cross; the middle of what `shorter` covers of it where they
-// are parallel.
+// The position on `longer`, which is not a point, where the lines cross; for parallel segments the middle of the part
+// that `shorter` overlaps.
 HPCCD_HOST_DEVICE inline double crossing_place(const Segment& longer, const Segment& shorter) {
-  // Below this sine all of the overlap lies within 1e-10 of both; above it a crossing is rounded by 1e-6 of the length
-  // along them, and so by 1e-16 across.
+  // Below this sine the whole overlap is within 1e-10 of both segments. Above it the crossing has an error of 1e-6 of
+  // the length along them, and so of 1e-16 across.
   constexpr double parallel = 1e-10;
   const Vec3<double> u = unit(longer.along), v = unit(shorter.along), n = cross(u, v);
   const double nn = dot(n, n);
@@ -50,7 +51,7 @@ HPCCD_HOST_DEVICE inline double crossing_place(const Segment& longer, const Segm
   return 0.5 * (nearest_place(longer, shorter.at(0)) + nearest_place(longer, shorter.at(1)));
 }
 
-// The place on `shorter` nearest to `longer`.
+// The position on `shorter` nearest to `longer`.
 HPCCD_HOST_DEVICE inline double meeting_place(const Segment& longer, const Segment& shorter) {
   const double size = largest(longer.along);
   if (!(size > 0)) return 0;

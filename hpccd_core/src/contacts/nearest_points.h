@@ -11,12 +11,12 @@ namespace hpccd {
 
 struct NearestPoints {
   double distance;
-  Vec3<double> on_first, on_second;  // the vertex and the face, or edge a and edge b
-  Vec3<double> direction;            // unit length: from face to vertex, or from edge a to edge b; zero at no distance
-  bool certain;                      // the direction is reliable: not dominated by the rounding of positions
+  Vec3<double> on_first, on_second;  // on the vertex and the face, or on edge a and edge b
+  Vec3<double> direction;            // unit length: from face to vertex, or from edge a to edge b; zero at distance 0
+  bool certain;                      // the direction is reliable: not dominated by rounding errors of positions
 };
 
-// At a time of the step. If edges are parallel: in the middle of the stretch along which they are nearest.
+// At a time of the step. For parallel edges: in the middle of the stretch along which they are nearest.
 template <Kind kind, class Arbiter>
 HPCCD_HD NearestPoints nearest_points(const Vec3<double> t0[4], const Vec3<double> t1[4], double time,
                                       Arbiter& arbiter) {
@@ -26,8 +26,8 @@ HPCCD_HD NearestPoints nearest_points(const Vec3<double> t0[4], const Vec3<doubl
   const Motion<double> m = motion_of<kind>(q, q);
   const Snapshot<double> now{m.p0, m.a0, m.b0};
   const V n = cross(now.a, now.b);
-  // Of a small angle between a and b the places lose the square of its sine: below this they would be known to less
-  // than 1e-12 of the features' size.
+  // For a small angle between a and b, positions lose the square of its sine in accuracy: below this value they would
+  // be known to less than 1e-12 of the features' size.
   constexpr double flat = 1e-2;
   const bool place_is_known = dot(n, n) > flat * flat * (dot(now.a, now.a) * dot(now.b, now.b));
   const NearOrFar<double> checked = proximity_test<kind>(now, 0.0);
@@ -44,7 +44,7 @@ HPCCD_HD NearestPoints nearest_points(const Vec3<double> t0[4], const Vec3<doubl
   const Nearest<double> found = detail::straightened(place, now);
   const V direction = unit(found.straight);
   const double distance = sqrt(found.square);
-  // A gap in the interior of both features has the direction of n: its length only has to be certain about the side.
+  // A gap in the interior of both features has the direction of n: its length only has to determine the side.
   const bool certain = distance > long_enough || (place.inside && distance > 0x1p-45 * size &&
                                                   largest(n) > long_enough * (largest(now.a) + largest(now.b)));
   if constexpr (kind == Kind::vertex_face)

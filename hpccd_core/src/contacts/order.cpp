@@ -6,7 +6,7 @@
 namespace hpccd {
 namespace {
 
-// Calls use(found) for each, in pieces of about 0.1 ms.
+// Calls use(found) for each contact, in pieces of about 0.1 ms.
 template <class Use>
 void for_each_found(const std::vector<Contact>& list, const Cancellation& cancellation, Use&& use) {
   in_pieces(cancellation, list.size(), 1 << 15, [&](std::size_t begin, std::size_t end) {
@@ -28,8 +28,8 @@ void ContactOrder::add_lists(const std::vector<Worker>& workers, std::vector<Con
                      [&](const Contact& f) { highest[i] = std::max(highest[i], f.first); });
   });
   const double features = static_cast<double>(*std::max_element(highest.begin(), highest.end())) + 1;
-  // Few in each: to sort eight takes a third of what it takes among a hundred. But no more counters, of which each
-  // worker has its own, than contacts.
+  // Few contacts per bucket: sorting eight takes a third of the time per contact of sorting a hundred. But no more
+  // counters, of which each worker has its own, than contacts.
   const std::size_t n_buckets =
       std::clamp<std::size_t>(n / (8 * workers.size()), std::min<std::size_t>(n / 128 + 1, 2048), 1 << 16);
   for (const Worker& w : workers)
@@ -72,7 +72,7 @@ void ContactOrder::scatter(std::size_t i, const Cancellation& cancellation) {
 void ContactOrder::sort(std::size_t bucket, const Cancellation& cancellation) {
   const auto first = all_.begin() + static_cast<std::ptrdiff_t>(begin(bucket)),
              last = all_.begin() + static_cast<std::ptrdiff_t>(end(bucket));
-  // All contacts of one vertex lie in one bucket, however many they are.
+  // All contacts of one vertex are in one bucket, which may therefore be large.
   constexpr std::ptrdiff_t many = 1 << 14;
   if (last - first < many)
     std::sort(first, last, before);

@@ -12,7 +12,7 @@ namespace hpccd {
 
 class ContactOrder {
  public:
-  // Distributes what the workers found. `meanwhile(i)`, for each i < n_meanwhile, runs beside it.
+  // Distributes the workers' contacts to buckets. `meanwhile(i)`, for each i < n_meanwhile, runs concurrently.
   template <class Job>
   void distribute(const std::vector<Worker>& workers, ThreadPool& pool, std::size_t n_meanwhile, Job&& meanwhile) {
     count(workers, pool);
@@ -23,7 +23,7 @@ class ContactOrder {
   }
 
   std::size_t buckets() const { return begin_.size() - 1; }
-  // Where the bucket's contacts stand among all.
+  // Index of the bucket's first contact.
   std::size_t begin(std::size_t bucket) const { return begin_[bucket]; }
   std::size_t end(std::size_t bucket) const { return begin_[bucket + 1]; }
   void sort(std::size_t bucket, const Cancellation& cancellation);
@@ -36,7 +36,7 @@ class ContactOrder {
     const std::vector<Contact>* found;
     std::size_t first_bucket, n_buckets;
     double buckets_per_feature;
-    std::vector<std::size_t> next;  // by bucket: how many, then where the next one goes
+    std::vector<std::size_t> next;  // by bucket: the number of contacts, then the position of the next one
     std::size_t bucket_of(const Contact& f) const { return static_cast<std::size_t>(f.first * buckets_per_feature); }
   };
 

@@ -16,7 +16,7 @@ struct Outputs {
 
 struct PairPlaces {
   Vec3<double> point, normal;
-  Vec3<double> closest[2];  // on the first feature, on the second
+  Vec3<double> closest[2];  // positions on the first and on the second feature
 };
 
 }  // namespace hpccd

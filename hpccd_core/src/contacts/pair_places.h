@@ -8,7 +8,7 @@
 
 namespace hpccd {
 
-// Vertices as in motion.h. What nobody asked for is zero.
+// Vertices as in motion.h. Outputs that are not requested are zero.
 template <Kind kind, class Arbiter>
 HPCCD_HD PairPlaces pair_places(const Vec3<double> t0[4], const Vec3<double> t1[4], double toc, double separation,
                                 Outputs outputs, Arbiter& arbiter) {
@@ -19,7 +19,7 @@ HPCCD_HD PairPlaces pair_places(const Vec3<double> t0[4], const Vec3<double> t1[
   if (outputs.closest || separated) {
     const NearestPoints nearest = nearest_points<kind>(t0, t1, time, arbiter);
     if (outputs.closest) places.closest[0] = nearest.on_first, places.closest[1] = nearest.on_second;
-    // At no distance as in plain contact: there is no direction between the points.
+    // At distance 0 as in plain contact: there is no direction between the points.
     if (separated && point_open && nearest.distance > 0) {
       places.point = 0.5 * nearest.on_first + 0.5 * nearest.on_second;
       point_open = false;

@@ -10,7 +10,7 @@
 namespace hpccd {
 namespace {
 
-// Feature numbers as they sort: vertex and face, or both edges.
+// Feature numbers in sorting order: vertex and face, or both edges.
 struct Key {
   std::uint64_t a, b;
   friend auto operator<=>(const Key&, const Key&) = default;
@@ -21,11 +21,11 @@ Key key_of(const std::array<std::uint32_t, 4>& ee) { return {pack(ee[0], ee[1]),
 struct Row {
   Key key;
   std::uint32_t answer;
-  std::uint32_t at;  // among those of its kind in its answer
+  std::uint32_t at;  // index among the rows of its kind in its part
 };
 
-// Of all answers, the first of each pair. Neighbouring runs are merged until one is left: of equal rows the earlier
-// answer's stays before. Detectors give sorted rows; whoever picked some of them may have others.
+// The first row of each pair among all parts. Neighbouring sorted runs are merged until one is left; of equal rows that
+// of the earlier part comes first. Detectors return sorted rows; rows that a caller has selected may be unsorted.
 template <class Pairs>
 std::vector<Row> rows_of_step(std::span<const ContactsOfPart> answers, Pairs ContactsOfPart::* pairs) {
   const auto less = [](const Row& x, const Row& y) { return x.key < y.key; };

@@ -8,7 +8,7 @@
 
 namespace hpccd {
 
-// What Contacts hold, where somebody else keeps it, of part number `part` of `parts` of equal duration.
+// The arrays of Contacts, owned by the caller, of part number `part` of `parts` parts of equal duration.
 struct ContactsOfPart {
   std::span<const std::array<std::uint32_t, 2>> vf;
   std::span<const double> vf_toc;
@@ -19,12 +19,11 @@ struct ContactsOfPart {
   double part = 0, parts = 1;
 };
 
-// Each pair once, as the first of the answers tells it, with its toc as a time of the step; of one world each, and in
-// the order of Contacts, which this is too. Throws InvalidArgument where an answer has fewer rows of one kind than of
-// another.
+// Each pair once, from the first part that contains it, with its toc as a time of the step, in the order of Contacts.
+// Parts are of one world each. Throws InvalidArgument if the arrays of a part have different lengths.
 Contacts contacts_of_step(std::span<const ContactsOfPart> answers);
 
-// As Contacts::hash of these, whatever their part.
+// The value of Contacts::hash for these contacts; the part does not matter.
 std::uint64_t hash_of_contacts(const ContactsOfPart& contacts);
 
 }  // namespace hpccd

@@ -11,7 +11,7 @@ namespace hpccd {
 
 PairPlaces pair_places(const UndecidedPair& pair, double toc, Outputs outputs);
 
-// Into entry i of lists that have room for it.
+// Writes to entry i of lists that are large enough.
 void write_places(Contacts& contacts, std::size_t i, const UndecidedPair& pair, double toc, Outputs outputs);
 void write_places(Contacts& contacts, std::size_t i, const Candidate& pair, double toc, const Geometry& geometry,
                   Outputs outputs);

@@ -10,7 +10,7 @@
 namespace hpccd {
 namespace {
 
-// Where the rows of each world begin, and behind the last.
+// Offsets of each world's rows, and the end of the last.
 template <class Answer, class Rows>
 std::vector<std::uint64_t> begins(const std::vector<Answer>& worlds, std::vector<Rows> Answer::* rows) {
   std::vector<std::uint64_t> begin{0};
@@ -39,7 +39,7 @@ void copy_rows(const std::vector<Row>& from, std::size_t first, std::size_t n, s
   });
 }
 
-constexpr std::size_t worlds_a_piece = 8;  // small ones take 0.2 us each
+constexpr std::size_t worlds_a_piece = 8;  // small worlds take 0.2 us each
 
 }  // namespace
 
@@ -52,7 +52,7 @@ void join_worlds(std::vector<Contacts>& worlds, ThreadPool& pool, Contacts& all)
   for (const Contacts& w : worlds) all.first_tocs.push_back(w.first_toc);
   all.first_toc = *std::ranges::min_element(all.first_tocs);
 
-  // All worlds are asked for the same outputs.
+  // All worlds have the same outputs.
   const auto rows_of = [&](auto Contacts::* list) {
     return std::ranges::any_of(worlds, [&](const Contacts& w) { return !(w.*list).empty(); }) ? n + m : 0;
   };

@@ -9,7 +9,8 @@
 
 namespace hpccd {
 
-// Into `all`, which is kept by a call that is cancelled. The worlds' rows are given up as they are copied.
+// Joins the worlds' contacts in `all`, which a cancelled call leaves unchanged. The rows of the worlds are released as
+// they are copied.
 void join_worlds(std::vector<Contacts>& worlds, ThreadPool& pool, Contacts& all);
 Intersections join_worlds(std::vector<Intersections>& worlds, ThreadPool& pool);
 

@@ -9,8 +9,8 @@
 
 namespace hpccd {
 
-// Positions in the order of pair_vertices. Along some axis they lie farther apart than the separation, in the same
-// order at the start and at the time, and so in between (bvh/motion_box.h).
+// Positions in the order of pair_vertices. True if along some axis the features are farther apart than the separation,
+// in the same order at the start and at the given time, and so in between (bvh/motion_box.h).
 template <Kind kind>
 HPCCD_HD bool apart_until(const Vec3<double> (&t0)[4], const Vec3<double> (&t1)[4], double time, double separation) {
   constexpr int of_first = kind == Kind::edge_edge ? 2 : 1;
@@ -26,7 +26,7 @@ HPCCD_HD bool apart_until(const Vec3<double> (&t0)[4], const Vec3<double> (&t1)[
         low[feature] = begins ? x : lesser(low[feature], x), high[feature] = begins ? x : greater(high[feature], x);
         largest = greater(largest, greater(magnitude(x0), magnitude(x1)));
       }
-      // Four roundings of at most half a unit in the last place of twice the largest, for either side.
+      // Four rounding errors of at most half a unit in the last place of twice the largest value, on either side.
       const double slack = separation + 4e-15 * largest;
       first_below = first_below && high[0] + slack < low[1];
       second_below = second_below && high[1] + slack < low[0];

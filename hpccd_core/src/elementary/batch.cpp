@@ -5,7 +5,7 @@
 
 namespace hpccd {
 
-// Of batch.inl, compiled for each instruction set.
+// The function of batch.inl, compiled for each instruction set.
 HPCCD_IN_EACH_SET(BatchTest batch_test(Accuracy);)
 
 BatchTest batch_test(Simd simd, Accuracy accuracy) { return HPCCD_OF_SET(simd, batch_test)(accuracy); }

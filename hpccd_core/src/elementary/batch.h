@@ -17,11 +17,11 @@ struct Geometry {
   const VertexMotion* vertices;
   const std::array<std::uint32_t, 2>* edges;
   const std::array<std::uint32_t, 3>* faces;
-  const VertexKdop* kdops = nullptr;       // of each vertex; none where features need not touch to count
-  const RoundedMotion* rounded = nullptr;  // for single precision; none where floats are too coarse for the scene
+  const VertexKdop* kdops = nullptr;       // of each vertex; null if pairs count that do not touch
+  const RoundedMotion* rounded = nullptr;  // for single precision; null if floats are too coarse for the scene
   Separations separations = {};            // for tests of distances
-  KdopMargin margin = {};                  // of the largest of them
-  float until = 2;                         // below 1: pairs that cannot touch up to this time may be left out
+  KdopMargin margin = {};                  // the largest separation
+  float until = 2;                         // below 1: pairs that cannot touch up to this time may be skipped
 };
 
 template <Kind kind>
@@ -38,7 +38,7 @@ inline void pair_vertices(const Geometry& g, Kind kind, std::uint32_t first, std
     pair_vertices<Kind::edge_edge>(g, first, second, v);
 }
 
-// Where these vertices are at both ends of the motion.
+// The positions of these vertices at both ends of the motion.
 HPCCD_HD void pair_positions(const Geometry& g, Kind kind, std::uint32_t first, std::uint32_t second,
                              Vec3<double> t0[4], Vec3<double> t1[4]) {
   std::uint32_t v[4];
@@ -49,21 +49,22 @@ HPCCD_HD void pair_positions(const Geometry& g, Kind kind, std::uint32_t first, 
   }
 }
 
-// So many that the survivors of each filter still fill the lanes of the next, and so few that the vertices and k-DOPs
-// of a batch stay in a core's cache from one filter to the next.
+// Large enough that the survivors of each filter still fill the lanes of the next, and small enough that the vertices
+// and k-DOPs of a batch stay in a core's cache from one filter to the next.
 inline constexpr std::uint32_t batch_capacity = 1024;
 
-// Where the pairs of the batch went; every pair is in exactly one place.
+// Outcomes of the pairs of a batch; every pair has exactly one outcome.
 struct BatchCounts {
-  std::uint64_t tested = 0;       // pairs that came in
-  std::uint64_t kdop = 0;         // rejected because their k-DOPs are apart
+  std::uint64_t tested = 0;       // pairs in the batch
+  std::uint64_t kdop = 0;         // rejected by the k-DOP filter
   std::uint64_t coplanarity = 0;  // rejected by the sign test on the cubic
-  std::uint64_t projection = 0;   // rejected because they stay outside in a projection
+  std::uint64_t projection = 0;   // rejected because the vertex or edge stays outside in a projection
   std::uint64_t roots = 0;        // rejected at the roots of the cubic
-  std::uint64_t separated = 0;    // rejected because a direction keeps them farther apart than their separation
-  std::uint64_t contacts = 0;     // proven contacts
-  std::uint64_t undecided = 0;    // handed to the tier's fallback
-  std::uint64_t kdop_ticks = 0;   // of the k-DOP filter (base/ticks.h)
+  std::uint64_t separated =
+      0;  // rejected because the features are farther apart than their separation along a direction
+  std::uint64_t contacts = 0;    // proven contacts
+  std::uint64_t undecided = 0;   // passed to the tier's fallback
+  std::uint64_t kdop_ticks = 0;  // time of the k-DOP filter (base/ticks.h)
 
   BatchCounts& operator+=(const BatchCounts& c) {
     tested += c.tested, kdop += c.kdop, coplanarity += c.coplanarity, projection += c.projection;
@@ -79,14 +80,15 @@ struct BatchResult {
   std::uint32_t undecided[batch_capacity];
   double toc[batch_capacity], delta[batch_capacity];
   BatchCounts counts;                  // accumulates over batches
-  double apart_until[batch_capacity];  // of undecided ones: what UndecidedPair tells; edges and faces have none
+  double apart_until[batch_capacity];  // for undecided pairs: see UndecidedPair; not for edges and faces
 };
 
-// first/second: vertex and face, or two edges. n <= batch_capacity.
+// first, second: vertex and face, or two edges. n <= batch_capacity.
 using BatchTest = void (*)(const Geometry&, Kind, const std::uint32_t* first, const std::uint32_t* second,
                            std::uint32_t n, BatchResult&);
 
-// Never Simd::automatic. "fast" has a test of its own; the other tiers share one and differ in their fallback.
+// `simd` must not be Simd::automatic. "fast" has a test of its own; the other tiers share one and differ in their
+// fallback.
 BatchTest batch_test(Simd simd, Accuracy accuracy);
 
 }  // namespace hpccd

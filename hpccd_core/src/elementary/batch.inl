@@ -12,12 +12,13 @@ namespace hpccd::HPCCD_ISA {
 #include "elementary/kdop_filter.inl"
 #include "elementary/pair_lanes.inl"
 
-// Pairs that may touch, by how much is to be done for them.
+// Pairs that may touch, sorted by the tests that they still need.
 struct Sorted {
   Chosen single, many;
 };
 
-// All that is cheap, for the chosen pairs: what is certainly apart goes, the rest is sorted by the roots it may have.
+// The cheap filters, for the chosen pairs: rejects pairs that are certainly apart, and sorts the rest by their possible
+// roots.
 template <Kind kind, class Policy, class R, class Numbers>
 HPCCD_HD void sort_out(const Geometry& g, const PairList& list, Numbers& chosen, Sorted& out, BatchCounts& counts) {
   std::uint32_t n_survivors = 0, n_apart = 0;
@@ -40,8 +41,8 @@ HPCCD_HD void sort_out(const Geometry& g, const PairList& list, Numbers& chosen,
   counts.roots += n_apart;
 }
 
-// Of pairs with none or several roots: those that do not stay outside in a projection. (Of those with one most are
-// certainly apart there, which costs less.)
+// For pairs without a certain root or with several: keeps those that do not stay outside in a projection. (Most pairs
+// with one root are certainly apart at that root, which is cheaper to decide.)
 template <Kind kind, class R>
 HPCCD_HD void leave_out_outside(const Geometry& g, const PairList& list, Chosen& many, BatchCounts& counts) {
   Chosen left;
@@ -54,7 +55,7 @@ HPCCD_HD void leave_out_outside(const Geometry& g, const PairList& list, Chosen&
   __builtin_memcpy(many.of, left.of, left.n * sizeof *left.of);
 }
 
-// Contacts and undecided pairs of those that were sorted. R: what roots are sought in.
+// Contacts and undecided pairs among the sorted ones. R: the type in which roots are computed.
 template <Kind kind, class Policy, class R>
 HPCCD_HD void seek_roots(const Geometry& g, const PairList& list, Sorted& sorted, Chosen& undecided,
                          BatchResult& result) {
@@ -75,13 +76,14 @@ void list_touching(const Geometry& g, const std::uint32_t* first, const std::uin
   const std::uint64_t began = ticks();
   const auto list_before = [&](const auto* next) { list_pairs<kind>(Apart(), g, next, first, second, n, list); };
   g.rounded ? list_before(g.rounded) : list_before(g.vertices);
-  if (const std::uint64_t now = ticks(); now > began) counts.kdop_ticks += now - began;  // else on another core
+  if (const std::uint64_t now = ticks(); now > began)
+    counts.kdop_ticks += now - began;  // otherwise the thread has moved to another core
   counts.tested += n;
   counts.kdop += n - list.n;
 }
 
-// Roots in double precision wait for each other's steps, division by division: two registers of pairs side by side take
-// three quarters of the time of one after the other.
+// Root searches in double precision wait for each other's divisions: two registers of pairs side by side take three
+// quarters of the time of one after the other.
 template <Kind kind, class Numbers>
 void test_in_doubles(const Geometry& g, const PairList& list, Numbers& chosen, Chosen& undecided, BatchResult& result) {
   Sorted sorted;
@@ -90,7 +92,7 @@ void test_in_doubles(const Geometry& g, const PairList& list, Numbers& chosen, C
   seek_roots<kind, Proven, Twice<Double>>(g, list, sorted, undecided, result);
 }
 
-// Where there are rounded coordinates they say of most pairs that they are apart, at half the price.
+// With rounded coordinates, most pairs are rejected at half the cost.
 template <Kind kind>
 void test_proven(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
                  BatchResult& result) {
@@ -110,13 +112,14 @@ void test_proven(const Geometry& g, const std::uint32_t* first, const std::uint3
   } else {
     test_in_doubles<kind>(g, list, all, undecided, result);
   }
-  // For the few undecided candidates only, where it costs little. Asked on every path, because later tests may have a
-  // tolerance: for flying needles, one pair in 700 would be a contact there.
+  // Only for the few undecided candidates, where it is cheap. It must run on every path, because later tests may use a
+  // tolerance: for flying needles, one pair in 700 would otherwise be a false positive.
   leave_out_outside<kind, Double>(g, list, undecided, result.counts);
   report_undecided(list, undecided, result);
 }
 
-// What single precision cannot tell, such as motions that are coplanar throughout, is asked in double precision.
+// Pairs that single precision leaves undecided, such as motions that are coplanar throughout, are tested in double
+// precision.
 template <Kind kind>
 void test_likely(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
                  BatchResult& result) {

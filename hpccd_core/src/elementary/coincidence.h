@@ -7,7 +7,8 @@
 
 namespace hpccd {
 
-// Any of the first n_first places with any of the others. The coordinates are the given ones, not differences.
+// Whether any of the first n_first points equals any of the others. The coordinates are the given ones, not
+// differences.
 template <int n_first, int n>
 HPCCD_HD bool share_a_place(const Vec3<double> (&q)[n]) {
   bool shared = false;

@@ -47,8 +47,8 @@ HPCCD_HD CubicError<R> coplanarity_error(const Magnitudes<R>& m) {
   // 220 u M; the second split point is rounded by 3 u, where |f'| <= 36 M: 328 u M in all.
   CubicError<R> e{R(64 * half_ulp<R>()) * scale, R(112 * half_ulp<R>()) * scale, R(400 * half_ulp<R>()) * scale};
   if constexpr (coordinate_error<R>() > 0) {
-    // Of a determinant's six products, each with one factor that is off, at most; a Bernstein coefficient is a mean of
-    // such, and a value of f a mean of these.
+    // Bounds the error of a determinant's six products with one inaccurate factor each; a Bernstein coefficient is a
+    // mean of such determinants, and a value of f is a mean of coefficients.
     const R off = R(6 * coordinate_error<R>()) * (m.p * m.a + m.p * m.b + m.a * m.b);
     e = {e.coefficient + off, e.value + off, e.subdivided + off};
   }
@@ -67,7 +67,7 @@ HPCCD_HD R slope(const Cubic<R>& f, R t) {
   return s * s * (f.k1 - R(3) * f.c0) + R(2) * s * t * (f.k2 - f.k1) + t * t * (R(3) * f.c3 - f.k2);
 }
 
-// True where all Bernstein coefficients have one certain sign: f has no root in [0, 1].
+// True if all Bernstein coefficients certainly have the same sign: f has no root in [0, 1].
 template <class R>
 HPCCD_HD typename RealTraits<R>::Mask certainly_no_root(const Cubic<R>& f, R error) {
   const R e3 = R(3) * error;

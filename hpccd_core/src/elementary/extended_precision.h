@@ -43,17 +43,17 @@ HPCCD_HD std::int64_t grid_point(DoubleDouble x) {
 
 // m / 2^62 rounded down to a double: the bits of exact::rounded_down, by what devices have.
 HPCCD_HD double rounded_down(std::int64_t m) {
-  double d = static_cast<double>(m);  // to nearest
+  double d = static_cast<double>(m);  // rounds to nearest
   if (static_cast<std::int64_t>(d) > m) {
-    int shift = 0;  // of the bits below a double's 53
+    int shift = 0;  // the bits below a double's 53
     while (static_cast<std::uint64_t>(m) >> shift >> 53) ++shift;
     d = static_cast<double>(m >> shift << shift);
   }
   return d * 2.168404344971009e-19;  // 2^-62
 }
 
-// Whether the features touch at t = 0, in integers: meshes at rest on one another. No where that is not certain: where
-// the coordinates take more than 41 bits, or the spanning vectors are parallel.
+// Whether the features touch at t = 0, in integers: meshes at rest on one another. False if that is not certain: if the
+// coordinates need more than 41 bits, or if the spanning vectors are parallel.
 template <Kind kind>
 HPCCD_HD bool certainly_touch_at_start(const Motion<DoubleDouble>& m) {
   __extension__ typedef __int128 Wide;  // products of three 41-bit numbers, six of them added: 126 bits
@@ -68,7 +68,7 @@ HPCCD_HD bool certainly_touch_at_start(const Motion<DoubleDouble>& m) {
   std::int64_t v[9];
   for (int i = 0; i < 9; ++i) {
     const double scaled = scalbn(given[i].high, 40 - exponent);
-    // The smallest numbers vanish beside the largest ones.
+    // Very small numbers are negligible beside the largest ones.
     if (floor(scaled) != scaled || (scaled == 0 && given[i].high != 0)) return false;
     v[i] = static_cast<std::int64_t>(scaled);
   }
@@ -89,7 +89,7 @@ HPCCD_HD bool certainly_touch_at_start(const Motion<DoubleDouble>& m) {
   return false;
 }
 
-// The nearest double not above x >= 0.
+// The largest double that is at most x >= 0.
 HPCCD_HD double rounded_towards_zero(DoubleDouble x) {
   return x.low < 0 ? x.high - x.high * 1.1102230246251565e-16 : x.high;  // 2^-53: half an ulp or a whole one
 }

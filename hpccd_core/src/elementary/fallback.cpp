@@ -25,8 +25,8 @@ std::optional<double> tolerance_contact(const UndecidedPair& q) {
 }
 
 // Whether the features are within d at the start. Meshes that rest or slide exactly at their separation have many such
-// pairs, which no floating-point precision decides: integers for one time take 0.7 us, the search over time 25 us and
-// then integers over time. Doubles decide most other pairs first.
+// pairs, which no floating-point precision decides. Integers for one time take 0.7 us; the search over time followed by
+// integers over time takes 25 us. Doubles decide most other pairs first.
 template <Kind kind>
 bool within_at_start(const UndecidedPair& q, FallbackCounts& counts) {
   using S = Spans<kind>;
@@ -54,7 +54,7 @@ std::optional<double> extended_or_exact(const UndecidedPair& q, FallbackCounts& 
 }  // namespace
 
 std::optional<double> decide_contact(Accuracy accuracy, const UndecidedPair& q, FallbackCounts& counts) {
-  // The exact answer is conservative too.
+  // The exact result is conservative as well.
   if (promises_answers(accuracy)) {
     ++counts.integers;
     return exact::earliest_contact(q.kind, q.t0, q.t1);
@@ -73,7 +73,7 @@ std::optional<double> decide_proximity(Accuracy, const UndecidedPair& q, Fallbac
   if (touch) return 0;
   ++counts.integers;
   if (!exact::within(q.kind, q.t0, q.separation)) return std::nullopt;
-  // Rounded it may come out above what it is known not to exceed.
+  // Rounding may bring it above the separation, which it cannot exceed.
   return std::min(exact::distance(q.kind, q.t0), q.separation);
 }
 

@@ -10,28 +10,29 @@
 
 namespace hpccd {
 
-// Who decided, at the end.
+// Counts of pairs by the stage that decided them.
 struct FallbackCounts {
   std::uint64_t tolerance = 0;  // "balanced", "fast": double precision with a tolerance
-  std::uint64_t extended = 0;   // twice the precision
+  std::uint64_t extended = 0;   // 106 bits
   std::uint64_t integers = 0;   // exact arithmetic
 };
 
-// A pair and where its vertices are at both ends of the step; q[0..3] as in motion.h.
+// A pair and the positions of its vertices at both ends of the step; q[0..3] as in motion.h.
 struct UndecidedPair {
   Kind kind;
   Vec3<double> t0[4], t1[4];
-  double separation;       // where the test has one
-  double apart_until = 0;  // farther apart than that up to here, by the test that left the pair undecided; 0: not known
+  double separation;       // for tests with a separation
+  double apart_until = 0;  // the time up to which a previous test has shown the features to be farther apart than the
+                           // separation; 0: unknown
 };
 
-// The time of contact, or the distance, or nothing.
+// Returns the time of contact, or the distance, or nothing.
 using Fallback = std::optional<double> (*)(Accuracy, const UndecidedPair&, FallbackCounts&);
 
 std::optional<double> decide_contact(Accuracy accuracy, const UndecidedPair& pair, FallbackCounts& counts);
-// The earliest time within a separation above 0. Here and below what stays open is rare: no tier gains by a guess.
+// The earliest time within a separation above 0. Here and below undecided pairs are rare, so all tiers decide exactly.
 std::optional<double> decide_separation(Accuracy accuracy, const UndecidedPair& pair, FallbackCounts& counts);
-// Of t0 alone: the distance, where it is no larger than the separation.
+// For t0 only: the distance, if it is at most the separation.
 std::optional<double> decide_proximity(Accuracy accuracy, const UndecidedPair& pair, FallbackCounts& counts);
 
 }  // namespace hpccd

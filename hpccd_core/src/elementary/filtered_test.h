@@ -12,7 +12,7 @@ template <class R>
 struct Outcome {
   using Mask = typename RealTraits<R>::Mask;
   Mask contact, none;  // neither: undecided
-  R toc, delta;        // the true time of contact lies within delta of toc
+  R toc, delta;        // the true time of contact is within delta of toc
 };
 
 template <class Policy, class R>
@@ -22,7 +22,7 @@ HPCCD_HD CubicError<R> error_of(const Magnitudes<R>& size) {
   return {by * e.coefficient, by * e.value, by * e.subdivided};
 }
 
-// The sign test on the coplanarity cubic, alone: where it has a pass of its own (gpu/candidates.cuh).
+// The sign test on the coplanarity cubic only, for a separate pass (gpu/candidates.cuh).
 template <class Policy, class R>
 HPCCD_HD Outcome<R> coplanarity_filter(const Motion<R>& m) {
   const Magnitudes<R> size = magnitudes(m);
@@ -30,7 +30,7 @@ HPCCD_HD Outcome<R> coplanarity_filter(const Motion<R>& m) {
   return {R(1) < R(0), usable && certainly_no_root(coplanarity(m), error_of<Policy>(size).coefficient), R(0), R(0)};
 }
 
-// One piece [low, high] of the step with exactly one root, which begins with sign `sign`.
+// One part [low, high] of the step with exactly one root; f begins with the sign `sign`.
 template <Kind kind, class Policy, class R>
 HPCCD_HD Outcome<R> piece_with_one_root(const Motion<R>& m, const Magnitudes<R>& size, const Cubic<R>& f, R error,
                                         R low, R high, R sign, typename RealTraits<R>::Mask active) {
@@ -40,9 +40,9 @@ HPCCD_HD Outcome<R> piece_with_one_root(const Motion<R>& m, const Magnitudes<R>&
   return {sure && v.yes && root.delta <= R(Policy::toc_radius), sure && v.no, root.t, root.delta};
 }
 
-// Of f with certainly one root in [0, 1], quickly: whether the features are certainly apart there. Two steps of
-// Newton's method lead near it, and most pairs that do not touch miss each other by far more than is left. `delta` is a
-// guess: that the root lies within it is proven by the signs of f on both sides.
+// For f with certainly one root in [0, 1]: a quick test whether the features are certainly apart at that root. Two
+// steps of Newton's method approach it, and most pairs that do not touch miss each other by far more than the remaining
+// error. `delta` is a guess; the signs of f on both sides prove that the root is within it.
 template <Kind kind, class R>
 HPCCD_HD typename RealTraits<R>::Mask certainly_apart_at_root(const Motion<R>& m, const Magnitudes<R>& size,
                                                               const Cubic<R>& f, R error) {
@@ -58,7 +58,7 @@ HPCCD_HD typename RealTraits<R>::Mask certainly_apart_at_root(const Motion<R>& m
   const R left = t - delta, right = t + delta;
   const auto sure =
       (left <= R(0) || sign * value(f, left) > error) && (right >= R(1) || sign * value(f, right) < R(0) - error);
-  return sure && inside<kind, Proven>(m, size, t, delta).no;  // of every tier: `delta` is wide
+  return sure && inside<kind, Proven>(m, size, t, delta).no;  // proven bounds for all tiers, since `delta` is wide
 }
 
 // The common case: f certainly has one root in [0, 1].
@@ -70,7 +70,7 @@ HPCCD_HD Outcome<R> single_root_test(const Motion<R>& m) {
   return piece_with_one_root<kind, Policy>(m, size, f, error_of<Policy>(size).value, R(0), R(1), sign, in_range(size));
 }
 
-// The general case: f is split where it turns; each piece holds no root, one root, or is undecided.
+// The general case: f is split at its extrema; each part has no root, one root, or is undecided.
 template <Kind kind, class Policy, class R>
 HPCCD_HD Outcome<R> many_roots_test(const Motion<R>& m) {
   using Mask = typename RealTraits<R>::Mask;
@@ -82,7 +82,7 @@ HPCCD_HD Outcome<R> many_roots_test(const Motion<R>& m) {
   const Pieces<R> second = subdivide(first.right, (turn.second - turn.first) / (R(1) - turn.first));
   const Cubic<R> piece[3] = {first.left, second.left, second.right};
   const R bound[4] = {R(0), turn.first, turn.second, R(1)};
-  Mask open = in_range(size);  // neither a contact found nor undecided in an earlier piece
+  Mask open = in_range(size);  // no contact found and nothing undecided in an earlier part
   Outcome<R> out{R(1) < R(0), R(1) < R(0), R(0), R(0)};
   for (int i = 0; i < 3; ++i) {
     const Mask one = open && certainly_one_root(piece[i], error.subdivided);

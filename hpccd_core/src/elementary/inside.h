@@ -7,7 +7,7 @@
 
 namespace hpccd {
 
-// Verdicts of a test that knows its own rounding errors.
+// Outcomes of a test with bounded rounding errors.
 template <class R>
 struct Verdict {
   using Mask = typename RealTraits<R>::Mask;
@@ -19,8 +19,8 @@ HPCCD_HD Vec3<R> interpolate(Vec3<R> v0, Vec3<R> v1, R t) {
   return (R(1) - t) * v0 + t * v1;
 }
 
-// A weight x / n in [0, 1], for signed n: yes where 0 <= x <= n certainly, no where x is certainly beyond both 0 and n,
-// on the same side. The latter needs no certain n: where n vanishes at a contact, so does x.
+// A weight x / n in [0, 1], for signed n. yes: certainly 0 <= x <= n. no: x is certainly beyond both 0 and n, on the
+// same side. The latter does not need a certain n: if n vanishes at a contact, so does x.
 template <class R>
 HPCCD_HD void require_between(Verdict<R>& all, R x, R n, R error) {
   const R d = x - n;
@@ -28,8 +28,8 @@ HPCCD_HD void require_between(Verdict<R>& all, R x, R n, R error) {
   all.no = all.no || lesser(x, d) > error || greater(x, d) < R(0) - error;
 }
 
-// The coordinate in which cross products are largest: the conditions of motion.h hold in each, and in this one rounding
-// matters least.
+// The coordinate in which cross products are largest: the conditions of motion.h hold in each coordinate, and rounding
+// matters least in this one.
 template <class R>
 struct LargestCoordinate {
   typename RealTraits<R>::Mask is_x, is_y;  // neither: z
@@ -43,12 +43,12 @@ struct LargestCoordinate {
   HPCCD_HD R pick(R for_x, R for_y, R for_z) const { return select(is_x, for_x, select(is_y, for_y, for_z)); }
 };
 
-// The conditions of motion.h in the coordinate in which the cross products are largest, sound for a contact anywhere
+// The conditions of motion.h in the coordinate in which the cross products are largest, valid for a contact anywhere
 // within delta of t.
 //
-// Bounds: interpolated coordinates carry 4 roundings, a component of a cross product two products of 10: 20 u MM; it
-// moves by at most 8 MM per unit of time. What is left of 24 u and 9 delta covers the roundings of sums. Of each of the
-// two products one factor may be off from the start (coordinate_error).
+// Bounds: interpolated coordinates have 4 rounding errors, a component of a cross product two products of 10: 20 u MM.
+// It changes by at most 8 MM per unit of time. The rest of 24 u and 9 delta covers the rounding errors of sums. In each
+// of the two products one factor may have an initial error (coordinate_error).
 template <Kind kind, class Policy, class R>
 HPCCD_HD Verdict<R> inside(const Motion<R>& m, const Magnitudes<R>& size, R t, R delta) {
   const Vec3<R> p = interpolate(m.p0, m.p1, t), a = interpolate(m.a0, m.a1, t), b = interpolate(m.b0, m.b1, t);
@@ -79,8 +79,8 @@ HPCCD_HD Verdict<R> inside(const Motion<R>& m, const Magnitudes<R>& size, R t, R
   return v;
 }
 
-// The same "no" for the whole step at once: beyond both 0 and n throughout. Quadratics in Bernstein form.
-// Bounds: products of two differences with 4 roundings, 2 of them in q0, q2 (8 u MM) and 4 in q1 (20 u MM).
+// The same "no" for the whole step at once: beyond both 0 and n throughout. Quadratics in Bernstein form. Bounds:
+// products of two differences with 4 rounding errors, 2 of them in q0, q2 (8 u MM) and 4 in q1 (20 u MM).
 template <class R>
 struct Quadratic {
   R q0, q1, q2;  // q1 is twice the Bernstein coefficient
@@ -103,7 +103,8 @@ HPCCD_HD Quadratic<R> planar_cross(R ux0, R uy0, R ux1, R uy1, R vx0, R vy0, R v
   return {ux0 * vy0 - uy0 * vx0, (ux0 * vy1 - uy0 * vx1) + (ux1 * vy0 - uy1 * vx0), ux1 * vy1 - uy1 * vx1};
 }
 
-// x certainly above both 0 and y, or below both, throughout; `error` bounds each of them and their difference.
+// x is certainly above both 0 and y, or below both, throughout; `error` bounds the error of each and of their
+// difference.
 template <class R>
 HPCCD_HD typename RealTraits<R>::Mask beyond(const Quadratic<R>& x, const Quadratic<R>& y, R error) {
   const Quadratic<R> d = x - y;
@@ -112,7 +113,7 @@ HPCCD_HD typename RealTraits<R>::Mask beyond(const Quadratic<R>& x, const Quadra
 
 template <Kind kind, class R>
 HPCCD_HD typename RealTraits<R>::Mask certainly_outside(const Motion<R>& m, const Magnitudes<R>& size) {
-  // The coordinate in which the cross products are largest at mid-step: drop it and look at the projection.
+  // The coordinate in which the cross products are largest at mid-step: the projection along it is tested.
   const Vec3<R> p = m.p0 + m.p1, a = m.a0 + m.a1, b = m.b0 + m.b1;
   const LargestCoordinate<R> dropped(cross(a, b), cross(p, b), cross(a, p));
   // (y, z), (z, x) or (x, y): the order that gives the component of the cross product its sign.
@@ -124,7 +125,7 @@ HPCCD_HD typename RealTraits<R>::Mask certainly_outside(const Motion<R>& m, cons
   const Quadratic<R> n = planar_cross(ax0, ay0, ax1, ay1, bx0, by0, bx1, by1);
   const Quadratic<R> alpha = planar_cross(px0, py0, px1, py1, bx0, by0, bx1, by1);
   const Quadratic<R> beta = planar_cross(ax0, ay0, ax1, ay1, px0, py0, px1, py1);
-  // 10 u for each Bernstein coefficient, doubled for the roundings of sums.
+  // 10 u for each Bernstein coefficient, doubled for the rounding errors of sums.
   const R u(32 * half_ulp<R>());
   R e_n = u * size.a * size.b, e_alpha = u * size.p * size.b, e_beta = u * size.a * size.p;
   if constexpr (coordinate_error<R>() > 0) {

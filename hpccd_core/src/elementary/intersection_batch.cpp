@@ -5,7 +5,7 @@
 
 namespace hpccd {
 
-// Of intersection_batch.inl, compiled for each instruction set.
+// The function of intersection_batch.inl, compiled for each instruction set.
 HPCCD_IN_EACH_SET(void intersection_batch(const Geometry&, const std::uint32_t*, const std::uint32_t*, std::uint32_t,
                                           BatchResult&);)
 

@@ -7,7 +7,7 @@
 
 namespace hpccd {
 
-// Of a pair of edge and face: q[0], q[1] and q[2], q[3], q[4] of exact/intersection.h.
+// The vertices of an edge and a face: q[0], q[1] and q[2], q[3], q[4] of exact/intersection.h.
 HPCCD_HD void edge_face_vertices(const Geometry& g, std::uint32_t edge, std::uint32_t face, std::uint32_t v[5]) {
   // Not through std::array (batch.h).
   const auto* e = reinterpret_cast<const std::uint32_t*>(g.edges + edge);
@@ -21,13 +21,13 @@ inline void edge_face_positions(const Geometry& g, std::uint32_t edge, std::uint
   for (int i = 0; i < 5; ++i) q[i] = {g.vertices[v[i]].t0[0], g.vertices[v[i]].t0[1], g.vertices[v[i]].t0[2]};
 }
 
-// n <= batch_capacity. Of the result: positions of the pairs that certainly intersect in `contact`, of those left to
-// integers in `undecided`, both ascending; no times. Of the counts `coplanarity` is what the signs of volumes reject,
-// `projection` what is apart in a projection.
+// n <= batch_capacity. Results: `contact` has the positions of pairs that certainly intersect, `undecided` those of
+// pairs left to integers, both ascending; there are no times. Counts: `coplanarity` are pairs rejected by signs of
+// volumes, `projection` pairs that are apart in a projection.
 using IntersectionBatch = void (*)(const Geometry&, const std::uint32_t* edge, const std::uint32_t* face,
                                    std::uint32_t n, BatchResult&);
 
-// Never Simd::automatic.
+// `simd` must not be Simd::automatic.
 IntersectionBatch intersection_batch(Simd simd);
 
 }  // namespace hpccd

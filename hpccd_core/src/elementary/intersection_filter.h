@@ -7,8 +7,8 @@
 
 namespace hpccd {
 
-// From the face's first corner: to the edge's ends p and r, and to the face's other corners a and b. Each coordinate is
-// the rounded difference of two given ones.
+// Vectors from the face's first corner to the edge's ends p and r, and to the face's other corners a and b. Each
+// coordinate is the rounded difference of two given ones.
 template <class R>
 struct EdgeFace {
   Vec3<R> p, r, a, b;
@@ -19,9 +19,9 @@ HPCCD_HD EdgeFace<R> edge_face(const Vec3<R> q[5]) {
   return {q[0] - q[2], q[1] - q[2], q[3] - q[2], q[4] - q[2]};
 }
 
-// The largest coordinates of each: the scale of every error bound. Volumes below are products of three of them, for
-// which in_range leaves room: (2^-240)^3 lies so far above the smallest double that its error bound exceeds all that
-// underflow can take from its terms.
+// The largest coordinates of each vector: the scale of every error bound. Volumes below are products of three of them,
+// which in_range allows for: (2^-240)^3 is so far above the smallest double that its error bound exceeds all losses by
+// underflow.
 template <class R>
 struct EdgeFaceSize {
   R p, r, a, b;
@@ -34,15 +34,15 @@ struct EdgeFaceSize {
   }
 };
 
-// By signs of volumes. height_p and height_r tell on which side of the face's plane the edge's ends are; alpha, beta
-// and gamma, which add up to d = height_r - height_p, on which side of the edge's line the face's edges pass. Where a
-// point q of the line lies in the face, q = alpha/d a + beta/d b; and for any q = x a + y b of it, whatever
-// degenerates, alpha = x d, beta = y d and gamma = (1 - x - y) d. So two of these four numbers of opposite signs mean
-// that the line misses the face.
+// The test by signs of volumes. height_p and height_r are the heights of the edge's ends above the face's plane. alpha,
+// beta and gamma, whose sum is d = height_r - height_p, tell on which side of the edge's line the face's edges pass. If
+// a point q of the line is in the face, q = alpha/d a + beta/d b. For any q = x a + y b of the line, degenerate cases
+// included, alpha = x d, beta = y d and gamma = (1 - x - y) d. So if two of these four numbers have opposite signs, the
+// line misses the face.
 //
-// Bounds: with differences that carry one rounding each, a volume is 3 terms of 2 |.||.||.| with 8 roundings: 48 u M.
-// d adds one rounding, gamma two to each of the four volumes in it: 60 u M. The rest of 64 covers second-order terms
-// and the roundings of M itself.
+// Bounds: with differences that have one rounding error each, a volume is 3 terms of 2 |.||.||.| with 8 rounding
+// errors: 48 u M. d adds one, gamma two to each of the four volumes in it: 60 u M. The rest of 64 covers second-order
+// terms and the rounding errors of M itself.
 template <class R>
 HPCCD_HD Verdict<R> volume_test(const EdgeFace<R>& q) {
   const EdgeFaceSize<R> size(q);
@@ -68,13 +68,13 @@ HPCCD_HD Verdict<R> volume_test(const EdgeFace<R>& q) {
   return {size.usable && crosses && inside, size.usable && (beside || outside)};
 }
 
-// What volumes leave open lies nearly in one plane. Seen along the axis along which the face looks largest, the two are
-// certainly apart where one of the lines of their four sides has the other figure beyond it: a condition that holds in
-// any projection of any two such figures.
+// Pairs that volumes leave undecided lie nearly in one plane. In the projection along the axis along which the face has
+// the largest area, the two are certainly apart if one of the lines of their four sides has the other figure beyond it:
+// a condition that holds in any projection of any two such figures.
 //
-// Bounds: areas, of two products of differences with 4 roundings, carry 8 u M; in sums of three of them each has 6
-// roundings: 12 u M. Every sum below holds an area of a kind at most twice; 32 covers that, the rounding of a limit
-// itself and what is of second order.
+// Bounds: areas, as two products of differences with 4 rounding errors, have 8 u M; in sums of three of them each has
+// 6: 12 u M. Every sum below contains an area of a kind at most twice; 32 covers that, the rounding of a limit itself
+// and second-order terms.
 template <class R>
 HPCCD_HD typename RealTraits<R>::Mask certainly_apart_in_projection(const EdgeFace<R>& q) {
   const EdgeFaceSize<R> size(q);
@@ -86,12 +86,12 @@ HPCCD_HD typename RealTraits<R>::Mask certainly_apart_in_projection(const EdgeFa
 
   const R u(32 * half_ulp<R>()), zero(0), to_edge = greater(size.p, size.r), to_face = greater(size.a, size.b);
   const R error = u * (size.a * size.b + to_edge * (size.a + size.b));
-  // On the face a weight lies between 0 and n.
+  // On the face a weight is between 0 and n.
   const R high = greater(zero, n) + error, low = lesser(zero, n) - error;
   const auto beyond = [&](R weight_p, R weight_r) {
     return lesser(weight_p, weight_r) > high || greater(weight_p, weight_r) < low;
   };
-  // Twice the areas of the edge and each corner.
+  // Twice the areas of the triangles of the edge and each corner.
   const R m_a = m + (beta_p - beta_r), m_b = m + (alpha_r - alpha_p);
   const R e_m = u * (size.p * size.r + to_edge * to_face);
   return size.usable && (beyond(alpha_p, alpha_r) || beyond(beta_p, beta_r) ||

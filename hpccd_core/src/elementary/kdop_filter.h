@@ -8,8 +8,8 @@
 
 namespace hpccd {
 
-// Whether two features are in the same order along a direction at both ends of the motion. place(end, i): where vertex
-// i is along it at that end.
+// Whether two features are in the same order along a direction at both ends of the motion. place(end, i): coordinate of
+// vertex i along the direction at that end.
 template <Kind kind, class Place>
 HPCCD_HD bool in_order(Place&& place) {
   using R = decltype(place(0, 0));
@@ -29,9 +29,9 @@ HPCCD_HD bool in_order(Place&& place) {
   return below || above;
 }
 
-// Whether two features are apart along a direction of their k-DOPs or along an axis, in double precision. Whatever
-// boxes and k-DOPs of floats say is apart, this does: a tier whose fallback has a tolerance asks it first, so that its
-// answer does not depend on who filtered before.
+// Whether two features are separated along a direction of their k-DOPs or along an axis, in double precision. This
+// includes all pairs that boxes and k-DOPs in single precision separate: a tier whose fallback has a tolerance asks it
+// first, so that its result does not depend on previous filters.
 template <Kind kind>
 HPCCD_HD bool apart(const Vec3<double> t0[4], const Vec3<double> t1[4]) {
   for (int k = 0; k < n_kdop_directions + 3; ++k)

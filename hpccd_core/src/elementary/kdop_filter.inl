@@ -18,7 +18,7 @@ HPCCD_HD bool are_apart(const KdopLanes& a, const KdopLanes& b) {
   return any_in_both_halves(less(a.high, b.low), less(b.high, a.low));
 }
 
-// Whether two features are apart, exactly or by more than a margin in each direction.
+// Whether two features are separated, exactly or by more than a margin in each direction.
 struct Apart {
   HPCCD_HD bool operator()(const KdopLanes& a, const KdopLanes& b) const { return are_apart(a, b); }
 };
@@ -29,7 +29,7 @@ struct ApartByMore {
   }
 };
 
-// Apart by more than a margin in each direction up to a time below 1.
+// Separated by more than a margin in each direction up to a time below 1.
 struct ApartUntil {
   Floats16 margin, time;
   HPCCD_HD bool operator()(const KdopLanes& a, const KdopLanes& b) const {
@@ -40,10 +40,10 @@ struct ApartUntil {
     return start + time * (x - start);
   }
 };
-// Values below eight, interpolated in floats, are off by 1.5e-6 each.
+// Values below eight, interpolated in floats, have errors of 1.5e-6 each.
 HPCCD_HD ApartUntil until(const Geometry& g) { return {load16(g.margin.in) + all16(4e-6f), all16(g.until)}; }
 
-// The pairs that are not apart. `next`: what the test after this one reads of them, by vertex.
+// Lists the pairs that are not separated. `next`: the data of each vertex that the following test reads.
 template <Kind kind, class AreApart, class Row>
 HPCCD_HD void list_near(const AreApart& apart, const Geometry& g, const Row* next, const std::uint32_t* first,
                         const std::uint32_t* second, std::uint32_t n, PairList& near) {
@@ -53,7 +53,8 @@ HPCCD_HD void list_near(const AreApart& apart, const Geometry& g, const Row* nex
     pair_vertices<kind>(g, first[i], second[i], v);
     const auto at = [&](int k) { return kdop_at(g.kdops, v[k]); };
     near.at[count] = i;  // kept only if counted
-    // The processor does not see it come: a twentieth of a step's time, though as much is fetched for what is not kept.
+    // Hardware does not prefetch this. It saves a twentieth of a step's time, although data of rejected pairs is
+    // fetched too.
     for (int k = 0; k < 4; ++k) __builtin_prefetch(next + v[k]);
     if constexpr (kind == Kind::vertex_face)
       count += !apart(at(0), both(at(1), both(at(2), at(3))));
@@ -64,7 +65,7 @@ HPCCD_HD void list_near(const AreApart& apart, const Geometry& g, const Row* nex
   near.find_vertices<kind>(g, first, second);
 }
 
-// All pairs where there are no k-DOPs, else those that may be near up to the time that matters.
+// Lists all pairs if there are no k-DOPs, otherwise those that may be near up to the time that matters.
 template <Kind kind, class AreApart, class Row>
 HPCCD_HD void list_pairs(const AreApart& apart, const Geometry& g, const Row* next, const std::uint32_t* first,
                          const std::uint32_t* second, std::uint32_t n, PairList& list) {

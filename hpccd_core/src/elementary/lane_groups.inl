@@ -2,8 +2,8 @@
 // Processes the pairs of a batch in groups of as many pairs as there are lanes. Part of distance_batch.inl and
 // intersection_batch.inl.
 
-// The pairs at `where` (null: all); the last group is filled up with copies of the last pair. What Pairs::load brings
-// into lanes goes to `function`, with the positions of these pairs and a bit for each lane that counts.
+// Processes the pairs at `where` (null: all); the last group is filled up with copies of the last pair. `function`
+// receives what Pairs::load brings into lanes, the positions of the pairs, and a bit for each valid lane.
 template <class Pairs, class Function>
 HPCCD_HD void for_groups(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second,
                          const std::uint32_t* where, std::uint32_t n, Function&& function) {

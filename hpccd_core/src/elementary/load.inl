@@ -2,10 +2,10 @@
 // Loads the vectors p, a, b of several pairs (motion.h) from rows of vertices into lanes. Part of pair_lanes.inl.
 // Subtractions are done a row at a time (both ends of a motion at once), then rows are transposed into lanes.
 
-// Both ends: a row of eight.
+// Both ends: a row of eight numbers.
 HPCCD_HD const double* row_of(const VertexMotion& v) { return reinterpret_cast<const double*>(&v); }
 
-// vertices[lane]: of a pair, in the order of the public queries.
+// vertices[lane]: the vertices of a pair, in the order of the public queries.
 template <Kind kind>
 HPCCD_HD Motion<Double> load(const Geometry& g, const std::uint32_t* const* vertices, Double*) {
   using S = Spans<kind>;

@@ -9,7 +9,7 @@
 
 namespace hpccd {
 
-// Edges meet faces in queries of one snapshot only.
+// Edge-face pairs occur in queries of one snapshot only.
 enum class Kind : unsigned char { vertex_face, edge_edge, edge_face };
 
 template <class R>
@@ -18,8 +18,8 @@ struct Motion {
   Vec3<R> p1, a1, b1;  // at t = 1
 };
 
-// From which of the four vertices to which p, a and b lead. Vertices in the order of the public queries: v f0 f1 f2, or
-// a0 a1 b0 b1.
+// The vertices from which and to which p, a and b lead, among the four vertices in the order of the public queries: v
+// f0 f1 f2, or a0 a1 b0 b1.
 template <Kind kind>
 struct Spans;
 template <>
@@ -47,9 +47,9 @@ HPCCD_HD Motion<R> motion_of(const Vec3<R> q_t0[4], const Vec3<R> q_t1[4]) {
   });
 }
 
-// By how much a coordinate of p, a or b may be off before any arithmetic, beside the rounding of the difference itself.
-// Doubles are the caller's coordinates. Floats are rounded ones (scene/vertex_motion.h): they lie below 2.25, so each
-// of two is off by half a unit in the last place of four.
+// The error of a coordinate of p, a or b before any arithmetic, without the rounding of the difference itself. Doubles
+// are the caller's coordinates. Floats are rounded coordinates (scene/vertex_motion.h): they are below 2.25, so each of
+// two has an error of half a unit in the last place of four.
 template <class R>
 HPCCD_HD constexpr double coordinate_error() {
   return sizeof(typename RealTraits<R>::Scalar) == 4 ? 2.4e-7 : 0;
@@ -65,7 +65,7 @@ template <class R>
 HPCCD_HD Magnitudes<R> magnitudes(const Motion<R>& m) {
   Magnitudes<R> size{greater(max_norm(m.p0), max_norm(m.p1)), greater(max_norm(m.a0), max_norm(m.a1)),
                      greater(max_norm(m.b0), max_norm(m.b1))};
-  if constexpr (coordinate_error<R>() > 0) {  // of the true ones
+  if constexpr (coordinate_error<R>() > 0) {  // errors of the true ones
     const R by(coordinate_error<R>());
     size = {size.p + by, size.a + by, size.b + by};
   }
@@ -73,12 +73,12 @@ HPCCD_HD Magnitudes<R> magnitudes(const Motion<R>& m) {
 }
 
 // Whether products of four magnitudes neither overflow nor lose bits to underflow, so that the relative error bounds
-// hold. The limits leave room for degree-4 terms of doubles: (2^-240)^4 = 2^-960, far above the smallest normal.
-// Written so that NaN says no.
+// hold. The limits allow for degree-4 terms of doubles: (2^-240)^4 = 2^-960, far above the smallest normal number.
+// False for NaN.
 template <class R>
 HPCCD_HD typename RealTraits<R>::Mask in_range(const Magnitudes<R>& m) {
   using Traits = RealTraits<R>;
-  // Beside the error of rounded coordinates, which lie in a range of their own, what is lost to underflow is nothing.
+  // Compared with the error of rounded coordinates, whose range is known, losses by underflow are negligible.
   if constexpr (coordinate_error<R>() > 0) return R(0) < R(1);
   double low = 5.7e-73, high = 1.7e72;  // 2^-240, 2^240
   if constexpr (requires { Traits::least_usable; }) low = Traits::least_usable, high = Traits::most_usable;

@@ -9,20 +9,21 @@
 
 namespace hpccd {
 
-// To be tested, or left undecided by a test.
+// A pair to be tested, or left undecided by a test.
 struct Candidate {
   std::uint32_t first, second;
   Kind kind;
 };
 
-// Its kind is that of the list it is in: with it 16 bytes, of which millions are sorted, would become 24.
+// The list of a contact determines its kind: a member for it would enlarge the struct, of which millions are sorted,
+// from 16 to 24 bytes.
 struct Contact {
   std::uint32_t first, second;
   double toc;
 };
 
-// The canonical order within one kind. No pair is found twice, so it is strict. An object: std::sort calls a function
-// through its address.
+// The canonical order within one kind. No pair occurs twice, so the order is strict. An object: std::sort would call a
+// function through its address.
 inline constexpr auto before = [](const Contact& a, const Contact& b) {
   return a.first < b.first || (a.first == b.first && a.second < b.second);
 };

@@ -4,7 +4,7 @@
 
 #include "elementary/load.inl"
 
-// So many pairs of a list, from number `begin` of the chosen on; a bit for each that counts.
+// A group of pairs of a list, from number `begin` of the chosen ones on, with a bit for each valid lane.
 template <class Numbers>
 struct LaneNumbers {
   const Numbers& numbers;
@@ -13,7 +13,7 @@ struct LaneNumbers {
   HPCCD_HD std::uint32_t operator[](int lane) const { return numbers[begin + static_cast<std::uint32_t>(lane)]; }
 };
 
-// What is loaded into lanes goes to `function`, as many pairs at a time as there are lanes.
+// Loads pairs into lanes and passes them to `function`, as many at a time as there are lanes.
 template <Kind kind, class R, class Numbers, class Function>
 HPCCD_HD void for_lanes(const Geometry& g, const PairList& list, Numbers& chosen, Function&& function) {
   constexpr std::uint32_t W = RealTraits<R>::width;

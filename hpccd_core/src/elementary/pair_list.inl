@@ -2,14 +2,14 @@
 // The remaining pairs of a batch, with the vertices of their features, which are looked up once for all filters. Part
 // of kdop_filter.inl.
 
-inline constexpr std::uint32_t most_lanes = 16;  // and so many copies of the last one behind it, to fill up lanes
+inline constexpr std::uint32_t most_lanes = 16;  // copies of the last pair that follow it, to fill up lanes
 
 struct PairList {
   std::uint32_t n = 0;
   std::uint32_t at[batch_capacity + most_lanes];  // in the batch
   std::uint32_t vertices[batch_capacity + most_lanes][4];
 
-  // The first n of `at` are there.
+  // The first n elements of `at` are valid.
   template <Kind kind>
   HPCCD_HD void find_vertices(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second) {
     const std::uint32_t filled = (n + most_lanes - 1) / most_lanes * most_lanes;
@@ -18,7 +18,7 @@ struct PairList {
   }
 };
 
-// Of a list, by number.
+// Selected pairs of a list, by number.
 struct Chosen {
   std::uint32_t n = 0;
   std::uint32_t of[batch_capacity + most_lanes];

@@ -11,7 +11,7 @@
 
 namespace hpccd {
 
-// edge(i) and face(i) return what holds the vertices of edge or face number i at [0], [1] and [2].
+// edge(i) and face(i) return an object with the vertices of edge or face number i at [0], [1] and [2].
 template <Kind kind, class Edge, class Face>
 HPCCD_HD void pair_vertices(std::uint32_t first, std::uint32_t second, Edge&& edge, Face&& face, std::uint32_t v[4]) {
   if constexpr (kind == Kind::vertex_face) {
@@ -23,7 +23,7 @@ HPCCD_HD void pair_vertices(std::uint32_t first, std::uint32_t second, Edge&& ed
   }
 }
 
-// The vertices of edges (n = 2) or faces (n = 3), one after the other.
+// The vertices of edges (n = 2) or faces (n = 3), consecutive in memory.
 template <std::size_t n>
 struct VertexLists {
   const std::uint32_t* vertices;

@@ -20,7 +20,7 @@ namespace {
 
 Vec3<double> point(const Query& q, int row) { return {q[3 * row], q[3 * row + 1], q[3 * row + 2]}; }
 
-// Where single precision begins. Each query has a map of its own, so that no answer depends on the queries beside it.
+// The coordinate map of single precision. Each query has its own map, so that no result depends on other queries.
 CoordinateMap map_of(const Query& q) {
   double low[3], high[3];
   for (int k = 0; k < 3; ++k) {

@@ -7,8 +7,8 @@
 
 namespace hpccd {
 
-// Normalised to begin positive, the coefficients change sign exactly once whatever the uncertain ones are: f has
-// exactly one root in the piece and it is simple (Descartes' rule for Bernstein coefficients).
+// Normalised to begin positive, the coefficients change sign exactly once, whatever the uncertain ones are: f has
+// exactly one root in the part, and it is simple (Descartes' rule for Bernstein coefficients).
 template <class R>
 HPCCD_HD typename RealTraits<R>::Mask certainly_one_root(const Cubic<R>& f, R error) {
   const R sign = select(f.c0 < R(0), R(-1), R(1));
@@ -21,12 +21,12 @@ struct Pieces {
   Cubic<R> left, right;
 };
 
-// de Casteljau at t.
+// de Casteljau's algorithm at t.
 template <class R>
 HPCCD_HD Pieces<R> subdivide(const Cubic<R>& f, R t) {
   const R s = R(1) - t;
   R third(1.0 / 3.0);
-  if constexpr (requires { RealTraits<R>::half_ulp; }) third = R(1) / R(3);  // more than a double's bits
+  if constexpr (requires { RealTraits<R>::half_ulp; }) third = R(1) / R(3);  // more bits than a double has
   const R b0 = f.c0, b1 = third * f.k1, b2 = third * f.k2, b3 = f.c3;
   const R m01 = s * b0 + t * b1, m12 = s * b1 + t * b2, m23 = s * b2 + t * b3;
   const R l2 = s * m01 + t * m12, r1 = s * m12 + t * m23;
@@ -34,8 +34,8 @@ HPCCD_HD Pieces<R> subdivide(const Cubic<R>& f, R t) {
   return {{b0, R(3) * m01, R(3) * l2, mid}, {mid, R(3) * r1, R(3) * m23, b3}};
 }
 
-// Where f turns inside (0, 1), in order; where it does not turn, its point of inflection (a monotone cubic split there
-// has monotone Bernstein coefficients on both sides); outside (0, 1) or undefined: one half.
+// The extrema of f inside (0, 1), in order; without extrema, its point of inflection (a monotone cubic split there has
+// monotone Bernstein coefficients on both sides); outside (0, 1) or undefined: one half.
 template <class R>
 struct TurningPoints {
   R first, second;
@@ -56,7 +56,7 @@ HPCCD_HD TurningPoints<R> turning_points(const Cubic<R>& f) {
   const R inflection = inside_unit_or((R(0) - b) / a, R(0.5));
   const R x = inside_unit_or(q / a, R(-1)), y = inside_unit_or(d0 / q, R(-1));
   const auto turns = discriminant > R(0);
-  // One of x and y outside: both become the other, so that the middle piece is empty.
+  // If x or y is outside, both become the other one, so that the middle part is empty.
   const R first = select(x < R(0), y, select(y < R(0), x, lesser(x, y)));
   const R second = greater(x, y);
   const auto usable = turns && second > R(0);
@@ -65,15 +65,14 @@ HPCCD_HD TurningPoints<R> turning_points(const Cubic<R>& f) {
 
 template <class R>
 struct Root {
-  R t, delta;                            // the true root lies within delta of t
-  typename RealTraits<R>::Mask certain;  // ... which was proven by signs on both sides
+  R t, delta;                            // the true root is within delta of t
+  typename RealTraits<R>::Mask certain;  // ... which signs on both sides have proven
 };
 
-// The root of f in [low, high], which holds exactly one, with f(low) of sign `sign`. Newton's method kept inside the
-// shrinking bracket; each lane stops by its own criterion, so its result does not depend on its neighbours: where a
-// step is rounding, or below `enough`.
-// Where Newton's method begins: with more bits than doubles have at the root as doubles have it, two steps from its
-// own.
+// The root of f in [low, high], which contains exactly one, with f(low) of sign `sign`. Newton's method is kept inside
+// a shrinking bracket. Each lane stops by its own criterion, so its result does not depend on other lanes: when a step
+// is at rounding level, or below `enough`. Starting point for more bits than doubles have: the root in double
+// precision, two of Newton's steps away from the result.
 template <class R>
 HPCCD_HD R first_guess(const Cubic<R>& f, R low, R high, R sign);
 
@@ -86,7 +85,8 @@ HPCCD_HD Root<R> bracketed_root(const Cubic<R>& f, R error, R low, R high, R sig
   R t = first_guess(f, low, high, sign);
   R step = high - low;
   Mask running = active;
-  // As many bisections as a double has bits, and some more: a root that is not there by then shows below as uncertain.
+  // As many bisections as a double has bits, and some more: a root that is not found by then is reported as uncertain
+  // below.
   constexpr int most_steps = 80;
   for (int i = 0; i < most_steps && any(running); ++i) {
     const R ft = sign * value(f, t);
@@ -96,7 +96,7 @@ HPCCD_HD Root<R> bracketed_root(const Cubic<R>& f, R error, R low, R high, R sig
     high = select(running && !before, t, high);
     const R guess = t - newton;
     const Mask converged = magnitude(newton) <= least_step;
-    // Newton's step must stay inside and halve the last step; written so that NaN bisects.
+    // Newton's step must stay inside and at most half as long as the last step. Written so that NaN leads to bisection.
     const Mask good = converged || (guess > low && guess < high && magnitude(newton) < R(0.5) * step);
     const R next = select(good, guess, R(0.5) * (low + high));
     const R moved = magnitude(next - t);

@@ -9,7 +9,7 @@
 
 namespace hpccd::tolerance_test {
 
-// Relative to the size of the quantity compared. Undecided queries lie within about 1e-12 of a border.
+// Relative to the size of the compared quantity. Undecided queries are within about 1e-12 of a border.
 inline constexpr double tolerance = 1e-11;
 
 struct Answer {
@@ -42,8 +42,8 @@ HPCCD_HD bool touches_at(const Motion<double>& m, double t) {
          point_on_segment(p + b, p + b - a);
 }
 
-// Times to try, kept in ascending order. There are at most 34: two roots of each coordinate of four cross products and
-// of four dot products (add_border_events), and both ends.
+// Candidate times in ascending order. There are at most 34: two roots of each coordinate of four cross products and of
+// four dot products (add_border_events), and both ends.
 struct Times {
   static constexpr int capacity = 34;
   double t[capacity];
@@ -66,7 +66,7 @@ HPCCD_HD void add_quadratic_roots(Times& times, double q0, double q1, double q2)
   if (q != 0) times.add(q0 / q);
 }
 
-// Where the motion is coplanar throughout: the times at which a coordinate of one of the border conditions vanishes.
+// For motion that is coplanar throughout: the times at which a coordinate of one of the border conditions vanishes.
 template <Kind kind>
 HPCCD_HD void add_border_events(Times& times, const Motion<double>& m) {
   const auto add = [&](double ux0, double uy0, double ux1, double uy1, double vx0, double vy0, double vx1, double vy1) {
@@ -99,7 +99,8 @@ HPCCD_HD void add_border_events(Times& times, const Motion<double>& m) {
   }
 }
 
-// One common power of two brings the largest coordinate to about one: no overflow, and underflow is below tolerance.
+// Scales by one power of two so that the largest coordinate is about one: no overflow, and underflow is below
+// tolerance.
 HPCCD_HD Motion<double> normalised(Motion<double> m) {
   const Magnitudes<double> size = magnitudes(m);
   const double largest = greater(greater(size.p, size.a), size.b);

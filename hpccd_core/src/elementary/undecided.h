@@ -7,7 +7,7 @@
 
 namespace hpccd {
 
-// What the fallback needs of a pair that a batch left undecided.
+// The data that the fallback needs for a pair that a batch left undecided.
 inline UndecidedPair undecided_pair(const Geometry& g, const Candidate& pair) {
   std::uint32_t v[4];
   pair_vertices(g, pair.kind, pair.first, pair.second, v);

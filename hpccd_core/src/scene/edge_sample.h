@@ -12,7 +12,8 @@
 
 namespace hpccd {
 
-// Every so many edges, and how many that makes: at least `wanted` where there are as many, and less than twice that.
+// A sample of the edges: the stride, and the number of edges in the sample, which is at least `wanted` if there are as
+// many, and less than twice that.
 struct EdgeSample {
   std::size_t stride, count;
 
@@ -20,15 +21,15 @@ struct EdgeSample {
     const std::size_t stride = n_edges / wanted > 1 ? n_edges / wanted : 1;
     return {stride, (n_edges + stride - 1) / stride};
   }
-  // Of their lengths in ascending order, the one that a quarter lies below.
+  // The index of the lower quartile of the lengths in ascending order.
   HPCCD_HD std::size_t short_one() const { return count / 4; }
 };
 
-// What is looked at in each step: each is a page of memory that nothing else needs then.
+// Edges read in each step: each is a page of memory that nothing else needs at that time.
 inline constexpr std::size_t edges_of_a_step = 64;
 
-// The length of a short edge of the scene (EdgeSample::short_one). length(from, to): of the edge between two vertices.
-// `wanted`: at most edges_of_a_step.
+// The length of a short edge of the scene (EdgeSample::short_one). length(from, to): length of the edge between two
+// vertices. `wanted`: at most edges_of_a_step.
 template <class Length>
 double short_edge(const std::vector<std::array<std::uint32_t, 2>>& edges, std::size_t wanted, Length&& length) {
   const EdgeSample sample = EdgeSample::of(edges.size(), wanted);
@@ -43,10 +44,10 @@ double short_edge(const std::vector<std::array<std::uint32_t, 2>>& edges, std::s
   return *at;
 }
 
-// Whether floats are fine enough for single precision where a quarter of the edges are no longer than this, in the
-// coordinates of the boxes. Else a scene is so large, or so fine, that too much would be wrong or left to the tests in
-// double precision. (By their mean, one large triangle beside a fine cloth would say yes: of 47,000 contacts 1,955 were
-// invented. Cloths whose edges are as short as this bound: one contact in a thousand.)
+// Whether single precision is fine enough if a quarter of the edges are at most this long, in coordinates of the boxes.
+// Otherwise the scene is so large, or so fine, that too many results would be wrong or left to the tests in double
+// precision. (By the mean length, one large triangle beside a fine cloth would pass: 1,955 false positives among 47,000
+// contacts. Cloths with edges as short as this bound: one in a thousand.)
 HPCCD_HD bool floats_suffice(double short_edge, double scale) {
   constexpr double least_rounded_edge = 1e-3;
   return scale * short_edge > least_rounded_edge;

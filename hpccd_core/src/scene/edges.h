@@ -11,21 +11,21 @@
 
 namespace hpccd {
 
-// In lexicographic order, and of each the primitive that represents it.
+// Edges in lexicographic order, and the primitive that represents each.
 struct Edges {
   std::vector<std::array<std::uint32_t, 2>> edges;
   std::vector<std::uint32_t> owner;
 };
 
-// Those of x.faces, each represented by the first triangle that has it. Of each vertex that is in a triangle it puts
-// the first one into vertex_owner, which holds UINT32_MAX.
+// The edges of x.faces, each represented by the first triangle that contains it. Writes the first triangle of each
+// vertex to vertex_owner, whose elements must be UINT32_MAX.
 Edges find_edges(const Features& x, ThreadPool& pool, std::vector<std::uint32_t>& vertex_owner);
 
-// Those of `given` that are not in `all`, in lexicographic order. One from a vertex to itself is none.
+// The edges in `given` that are not in `all`, in lexicographic order. Edges from a vertex to itself are skipped.
 std::vector<std::array<std::uint32_t, 2>> lone_edges(const std::vector<std::array<std::uint32_t, 2>>& given,
                                                      const Edges& all);
 
-// Both together. first: the primitive that represents the first lone edge.
+// All edges. first: the primitive that represents the first lone edge.
 Edges with_lone_edges(Edges all, const std::vector<std::array<std::uint32_t, 2>>& lone, std::uint32_t first);
 
 }  // namespace hpccd

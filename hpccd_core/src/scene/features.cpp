@@ -9,7 +9,7 @@
 namespace hpccd {
 namespace {
 
-// Lists of what each primitive owns, from each thing's owner (ascending within a primitive).
+// Lists the features of each primitive, from each feature's owner (ascending within a primitive).
 void group_by_owner(const std::vector<std::uint32_t>& owner, std::size_t n_primitives,
                     std::vector<std::uint32_t>& first, std::vector<std::uint32_t>& owned) {
   first.assign(n_primitives + 1, 0);

@@ -16,11 +16,11 @@ struct Features {
   std::vector<std::array<std::uint32_t, 2>> edges;  // v0 < v1, in lexicographic order: an edge's number is its rank
   std::vector<std::array<std::uint32_t, 3>> faces;
   // The primitives of the hierarchy, by number: all triangles (the paper's representative triangles, to which features
-  // are assigned), then the edges that are in no triangle, then the vertices that are in neither.
+  // are assigned), then edges of no triangle, then vertices of neither.
   std::vector<std::array<std::uint32_t, 2>> lone_edges;
   std::vector<std::uint32_t> lone_vertices;
   std::vector<std::uint32_t> mesh_of_primitive, mesh_of_vertex;
-  // What primitive p represents: edges owned_edges[first_edge[p] .. first_edge[p+1]), vertices likewise.
+  // The features that primitive p represents: edges owned_edges[first_edge[p] .. first_edge[p+1]), vertices likewise.
   std::vector<std::uint32_t> first_edge, owned_edges, first_vertex, owned_vertices;
   std::uint32_t n_vertices = 0;
 
@@ -35,8 +35,8 @@ struct Features {
   std::uint32_t n_primitives() const { return static_cast<std::uint32_t>(mesh_of_primitive.size()); }
 };
 
-// The same with any number of threads.
+// The result does not depend on the number of threads.
 Features features_of(const Scene& scene, ThreadPool& pool);
-Features features_of(const Scene& scene);  // by the calling thread
+Features features_of(const Scene& scene);  // on the calling thread
 
 }  // namespace hpccd

@@ -4,7 +4,7 @@
 namespace hpccd {
 namespace {
 
-// At the other tiers what is reported may not touch at all.
+// At the other tiers, reported pairs may not touch at all.
 bool tells_times(Rule rule) {
   return rule.separated || rule.accuracy == Accuracy::exact || rule.accuracy == Accuracy::conservative;
 }
@@ -32,7 +32,7 @@ void PairRules::set(std::uint32_t a, std::uint32_t b, Rule rule) {
   const Rule before = rules_.of(a, b);
   if (rule == before) return;
   if (!tested_.of(a, b)) return rules_.set(a, b, rule);
-  std::size_t& n = n_with_rule_[rule];  // may find no memory, as the next line: nothing is counted before
+  std::size_t& n = n_with_rule_[rule];  // this line and the next may throw bad_alloc: nothing is counted before
   rules_.set(a, b, rule);
   ++n;
   const auto as_before = n_with_rule_.find(before);

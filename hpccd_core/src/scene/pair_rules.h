@@ -12,7 +12,7 @@
 
 namespace hpccd {
 
-// The mesh of a node with triangles of several meshes.
+// The mesh number of a node with triangles of several meshes.
 inline constexpr std::uint32_t mixed_meshes = 0xFFFFFFFFu;
 
 // How the candidates of a pair of meshes are tested.
@@ -21,7 +21,7 @@ struct Rule {
   bool separated;  // for a minimum separation above 0
   TestedFeatures features = {};
 
-  // Of the test: it does not ask which candidates there are.
+  // Number of the test; independent of which candidates exist.
   unsigned number() const { return static_cast<unsigned>(accuracy) + (separated ? 4 : 0); }
   static Rule of_number(unsigned i) { return {static_cast<Accuracy>(i % 4), i >= 4}; }
   bool operator==(const Rule&) const = default;
@@ -35,26 +35,26 @@ inline constexpr unsigned n_rules = 8;
 class PairRules {
  public:
   PairRules(const Scene& scene, Accuracy accuracy, const SeparationTable& separations, TestedFeatures features = {});
-  // Updates the rules of pairs that were set since the table settled last.
+  // Updates the rules of pairs that were set since the table last settled.
   void change(const SeparationTable& separations);
-  // Meshes by number, or mixed_meshes: then some of their pairs may be enabled.
+  // Mesh numbers, or mixed_meshes: then some pairs may be enabled.
   bool enabled(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     if (tested_.all() || mesh_a == mixed_meshes || mesh_b == mixed_meshes) return true;
     return tested_.of(mesh_a, mesh_b);
   }
   bool all_meshes() const { return tested_.all(); }
   bool by_table() const { return tested_.by_table(); }
-  // As enabled(), where by_table() holds.
+  // As enabled(), if by_table() is true.
   bool enabled_by_table(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     return mesh_a == mixed_meshes || mesh_b == mixed_meshes || tested_.in_table(mesh_a, mesh_b);
   }
-  // Of an enabled pair.
+  // The rule of an enabled pair.
   Rule rule(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     return one_rule_ ? *one_rule_ : rules_.of(mesh_a, mesh_b);
   }
-  // Whether every pair that touches has a time of contact, to 1e-12, so that one that cannot touch until then has none.
+  // Whether every contact has a time within 1e-12, so that pairs that cannot touch before a time can be skipped.
   bool promise_times() const { return promise_times_; }
-  // Whether a pair is tested for which backends answer differently: "fast", without a separation.
+  // Whether a tested pair has a tier whose results depend on the backend: "fast", without a separation.
   bool any_fast() const { return any_fast_; }
   std::size_t bytes() const { return tested_.bytes() + rules_.bytes(); }
 

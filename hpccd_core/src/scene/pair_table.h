@@ -11,13 +11,13 @@
 
 namespace hpccd {
 
-// For reading it where the standard library may not be used.
+// Read access without the standard library.
 template <class T>
 struct PairValues {
   static constexpr std::uint64_t free_slot = ~std::uint64_t{0};
-  const T* all = nullptr;  // n_meshes^2; null: `otherwise`, except for pairs in the slots
+  const T* all = nullptr;  // n_meshes^2 values; null: `otherwise`, except for pairs in the slots
   std::uint32_t n_meshes = 0;
-  std::uint32_t slot_mask = 0;  // their number, a power of two, less one
+  std::uint32_t slot_mask = 0;  // number of slots, a power of two, minus one
   const std::uint64_t* keys = nullptr;
   const T* values = nullptr;
   T otherwise{};
@@ -50,7 +50,7 @@ class PairTable {
   }
 
   T of(std::uint32_t a, std::uint32_t b) const { return has_all() ? in_table(a, b) : view().of(a, b); }
-  // Only where has_all().
+  // Requires has_all().
   T in_table(std::uint32_t a, std::uint32_t b) const { return values_[a * n_ + b]; }
   PairValues<T> view() const {
     const auto n = static_cast<std::uint32_t>(n_);
@@ -75,8 +75,8 @@ class PairTable {
     values_[slot] = value;
   }
 
-  // Calls f(b, value) for the pairs of a mesh: for all pairs, or only those that were ever set if most have
-  // `otherwise`.
+  // Calls f(b, value) for the pairs of a mesh: for all pairs, or, without a table of all, only for pairs that were ever
+  // set.
   bool has_all() const { return n_ <= most_in_table; }
   template <class Function>
   void for_pairs_of(std::uint32_t a, Function&& f) const {
@@ -94,7 +94,7 @@ class PairTable {
   }
 
  private:
-  // Both, or none if memory runs out: otherwise a pair would count twice.
+  // Adds both directions, or neither if memory runs out: otherwise a pair would count twice.
   void add_partners(std::uint32_t a, std::uint32_t b) {
     partners_[a].push_back(b);
     if (a == b) return;
@@ -120,9 +120,9 @@ class PairTable {
   std::size_t n_;
   T otherwise_;
   std::size_t n_set_ = 0;
-  std::vector<std::uint64_t> keys_;                   // empty where there is a table of all pairs
+  std::vector<std::uint64_t> keys_;                   // empty if there is a table of all pairs
   std::vector<T> values_;                             // of all pairs, or by slot
-  std::vector<std::vector<std::uint32_t>> partners_;  // by mesh, with which others it has a slot
+  std::vector<std::vector<std::uint32_t>> partners_;  // by mesh: the other meshes with which it has a slot
 };
 
 }  // namespace hpccd

@@ -11,7 +11,7 @@ namespace hpccd {
 
 namespace {
 
-// Throws InvalidArgument where `indices` are not so many a feature, each below n_vertices.
+// Throws InvalidArgument unless `indices` has `corners` indices per feature, each below n_vertices.
 template <std::size_t corners>
 void check_indices(const char* argument, const char* of_what, std::span<const std::uint32_t> indices,
                    const std::string& mesh, std::uint32_t n_vertices) {
@@ -24,8 +24,8 @@ void check_indices(const char* argument, const char* of_what, std::span<const st
                             " vertices; indices count this mesh's own vertices from 0");
 }
 
-// A longer copy of all features, or nothing where there is room for n more. Beside the old one, so that what is added
-// may be a part of that.
+// A longer copy of all features, or nothing if the capacity suffices for n more. The old array stays valid, since the
+// added features may be part of it.
 template <class Feature>
 std::vector<Feature> with_room(const std::vector<Feature>& all, std::size_t n) {
   std::vector<Feature> larger;
@@ -72,7 +72,7 @@ std::uint32_t Scene::add_mesh(std::string name, std::span<const std::uint32_t> f
   auto more_edges = with_room(edges_, mesh.n_edges);
   if (meshes_.size() == meshes_.capacity()) meshes_.reserve(std::max<std::size_t>(4, 2 * meshes_.size()));
   names_.insert(std::move(name));
-  // From here on nothing throws: a mesh is there in full or not at all.
+  // Nothing below throws: a mesh is added completely or not at all.
   meshes_.push_back(std::move(mesh));
   append(faces_, more_faces, faces, n_vertices_);
   append(edges_, more_edges, edges, n_vertices_);

@@ -20,7 +20,7 @@ SeparationTable::SeparationTable(const Scene& scene, double otherwise)
 void SeparationTable::set(std::uint32_t a, std::uint32_t b, double separation) {
   if (!tested_.of(a, b)) return of_.set(a, b, separation);
   const double before = of(a, b);
-  // This line and the next two may run out of memory, so nothing is counted before them.
+  // This line and the next two may throw bad_alloc, so nothing is counted before them.
   std::size_t& n = n_with_value_[separation];
   changed_.push_back({a, b});
   of_.set(a, b, separation);

@@ -13,15 +13,15 @@
 
 namespace hpccd {
 
-// Statements about all pairs are about tested pairs only: the others do not grow boxes.
+// Properties of all pairs refer to tested pairs only: the others do not grow boxes.
 class SeparationTable {
  public:
   SeparationTable(const Scene& scene, double otherwise);
 
   double of(std::uint32_t mesh_a, std::uint32_t mesh_b) const { return of_.of(mesh_a, mesh_b); }
-  // The separation of pairs that were not set.
+  // The separation of pairs that are not set.
   double otherwise() const { return of_.otherwise(); }
-  // Many may follow each other: what says something of all pairs is as it was until settle().
+  // May be called repeatedly: properties of all pairs change only in settle().
   void set(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
   void settle();
   // Differs between any two states in which a tested pair differs.
@@ -33,7 +33,7 @@ class SeparationTable {
   bool uniform() const { return uniform_; }
   double first() const { return first_; }
   double most() const { return most_; }
-  // Calls f(mesh_a, mesh_b, separation), mesh_a <= mesh_b, for all pairs that differ from otherwise(), maybe for
+  // Calls f(mesh_a, mesh_b, separation), mesh_a <= mesh_b, for all pairs that differ from otherwise(), and possibly for
   // others.
   template <class Function>
   void for_pairs(Function&& f) const {
@@ -43,7 +43,7 @@ class SeparationTable {
       });
   }
   PairValues<double> of_pairs() const { return of_.view(); }
-  // By mesh: the largest of its pairs. Empty where no pair has a separation.
+  // By mesh: the largest separation of its pairs. Empty if no pair has a separation.
   const std::vector<double>& largest() const { return any() ? largest_ : none_; }
   std::size_t bytes() const {
     return of_.bytes() + tested_.bytes() + largest_.capacity() * sizeof(double) +

@@ -13,13 +13,13 @@ void require_rest(const Scene::Mesh& mesh, const Real* t0, const Real* t1) {
   const std::size_t begin = 3 * std::size_t{mesh.first_vertex}, n = 3 * std::size_t{mesh.n_vertices};
   if (std::memcmp(t0 + begin, t1 + begin, n * sizeof(Real)) == 0) return;
   for (std::size_t i = begin; i < begin + n; ++i)
-    // 0 and -0 differ in bits only; NaN is reported where all coordinates are checked.
+    // 0 and -0 differ only in their bits; NaN is reported when all coordinates are checked.
     if (t0[i] < t1[i] || t0[i] > t1[i])
       throw InvalidArgument("vertices_t1[" + std::to_string(i / 3) + "]: moves, but it belongs to mesh '" + mesh.name +
                             "', which was added as static; add it as one that moves, or keep its vertices");
 }
 
-// Of so many vertices, in the precision of p.
+// Bytes of this number of vertices, in the precision of p.
 std::size_t bytes_of(std::uint32_t vertices, Positions p) { return 3 * std::size_t{vertices} * (p.is_double ? 8 : 4); }
 
 const std::byte* begin_of(const Scene::Mesh& mesh, Positions p) {
@@ -67,7 +67,8 @@ std::vector<char> StaticMeshes::unchanged(const Scene& scene, Positions t0, Posi
     resize(last_[m], bytes_of(meshes[m].n_vertices, t0), pool.cancellation());
     parallel_for(pool, last_[m].size(), 1 << 16,
                  [&](std::size_t begin, std::size_t end, int) { std::copy(all + begin, all + end, &last_[m][begin]); });
-    // Where the ends differ in signs of zeros, boxes and places have those of one of them: the next frame begins anew.
+    // If both ends differ only in signs of zeros, boxes and points have the sign of one of them: the next frame starts
+    // from scratch.
     if (!equal(last_[m], all, begin_of(meshes[m], t1), pool)) last_[m].clear();
   }
   return same;

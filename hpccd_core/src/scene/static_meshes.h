@@ -9,14 +9,14 @@
 
 namespace hpccd {
 
-// Throws InvalidArgument, naming mesh and vertex, where a mesh added as static moves during the step: its pairs with
-// other static meshes are never tested, so contacts would be lost silently. Positions must be in the host's memory.
+// Throws InvalidArgument with mesh and vertex if a static mesh moves during the step: its pairs with other static
+// meshes are never tested, so contacts would be lost silently. Positions must be in host memory.
 void require_static_meshes_rest(const Scene& scene, Positions vertices_t0, Positions vertices_t1);
 
-// Remembers where the static meshes were, so that what was computed from their positions can be kept.
+// Stores the positions of the static meshes, so that data computed from them can be reused.
 class StaticMeshes {
  public:
-  // By mesh: true where a static mesh is bit for bit where it was at the last look. Throws as above.
+  // By mesh: whether a static mesh is bit-identical to the previous positions. Throws as above.
   std::vector<char> unchanged(const Scene& scene, Positions vertices_t0, Positions vertices_t1, ThreadPool& pool);
   std::size_t bytes() const;
 

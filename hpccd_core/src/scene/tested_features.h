@@ -8,7 +8,7 @@
 
 namespace hpccd {
 
-// Throws InvalidArgument, which names the argument, where nothing would be tested.
+// Throws InvalidArgument with the name of the argument if nothing would be tested.
 inline void require_some(const char* name, TestedFeatures features) {
   if (!features.vertex_face && !features.edge_edge)
     throw InvalidArgument(std::string(name) +

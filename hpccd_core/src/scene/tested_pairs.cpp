@@ -14,7 +14,7 @@ TestedPairs::TestedPairs(const Scene& scene) : not_ignored_(scene.meshes().size(
   for (std::uint32_t a = 0; a < n; ++a) {
     const bool moves = !(meshes_[a] & is_static), itself = by_meshes(a, a);
     n_with_.push_back((moves ? n - 1 : n_moving) + itself);
-    n_pairs_ += n_with_[a] + itself;  // each pair of two counts twice so far
+    n_pairs_ += n_with_[a] + itself;  // each pair of two meshes is counted twice so far
   }
   n_pairs_ /= 2;
   for (const auto& [pair, ignored] : ScenePairs(scene).ignored()) {

@@ -15,7 +15,7 @@ class TestedPairs {
   explicit TestedPairs(const Scene& scene);
 
   bool all() const { return all_; }
-  // Whether a table of all pairs tells, or none is needed.
+  // Whether a table of all pairs exists, or none is needed.
   bool by_table() const { return all_ || not_ignored_.has_all(); }
   bool in_table(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     return all_ || not_ignored_.in_table(mesh_a, mesh_b);
@@ -34,13 +34,13 @@ class TestedPairs {
 
  private:
   enum : unsigned char { is_static = 1, within = 2 };
-  // According to their options.
+  // By the options of the meshes.
   bool by_meshes(std::uint32_t a, std::uint32_t b) const {
     return !(meshes_[a] & meshes_[b] & is_static) && (a != b || meshes_[a] & within);
   }
 
   std::vector<unsigned char> meshes_;
-  PairTable<unsigned char> not_ignored_;  // a table of all pairs says what options say, too
+  PairTable<unsigned char> not_ignored_;  // a table of all pairs includes the options
   std::vector<std::size_t> n_with_;
   std::size_t n_pairs_ = 0;
   bool all_ = true;

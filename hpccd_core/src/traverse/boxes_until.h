@@ -13,7 +13,7 @@ struct BoxesUntil {
   using Ends = AtLeaves;
   static constexpr bool shrink = true;
   const ContactSearch& search;
-  // When it was looked at last.
+  // The best time when it was last read.
   double best = search.earliest.load(std::memory_order_relaxed);
   PartOfMotion part = search.part();
 
@@ -32,7 +32,7 @@ struct BoxesUntil {
   void sort(std::vector<NodePair>&, std::size_t) const {}
 };
 
-// The same if boxes of some pairs of meshes have grown by more than their separation requires.
+// The same for scenes with an excess: boxes of some pairs of meshes have grown by more than their separation requires.
 struct BoxesUntilLessExcess : BoxesUntil {
   bool overlap(const Node& a, const Node& b) const {
     const float excess = search.excess.of(a, b);

@@ -9,7 +9,7 @@ class CandidateRows {
     rows_[n_] = {number, others};
     n_ += others != 0;
   }
-  // Pairs with those of `others`, of which there are n.
+  // Appends the pairs with the n features in `others`.
   HPCCD_HD void append_to(std::uint32_t* first, std::uint32_t* second, std::uint32_t& n_pairs,
                           const std::uint32_t* others, std::uint32_t n) const {
     for (std::uint32_t begin = 0; begin < n; begin += 16) {
@@ -23,5 +23,5 @@ class CandidateRows {
   std::uint32_t n_ = 0;
   struct {
     std::uint32_t number, others;
-  } rows_[CornersOf::most_edges + 1];  // one more is written, not kept
+  } rows_[CornersOf::most_edges + 1];  // writes one pair more than it counts
 };

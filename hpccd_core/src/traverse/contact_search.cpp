@@ -11,7 +11,7 @@ namespace {
 
 #include "traverse/walk.inl"
 
-// Nodes that may hold a pair that touches and is not listed.
+// Nodes that may hold an unlisted pair that touches.
 struct UnlistedBoxes {
   using Ends = AtLeaves;
   static constexpr bool shrink = false;

@@ -24,7 +24,7 @@ CoordinateMap map_around(const std::vector<Vec3<double>>& snapshot) {
 
 }  // namespace
 
-// Boxes of all nodes, from those of the vertices.
+// Boxes of all nodes, from boxes of the vertices.
 template <class Box, class OfVertex>
 void Drift::join(const Tree& tree, std::vector<Box>& boxes, Box none, OfVertex&& of_vertex, ThreadPool& pool) {
   resize(boxes, tree.nodes.size(), pool.cancellation());
@@ -80,8 +80,8 @@ void Drift::fit(const Tree& tree, const std::vector<VertexMotion>& motion, const
   join(tree, ways_, {none, -none, none, -none}, of_vertex, pool);
 }
 
-// Ways are rounded to floats, interpolated and taken from each other: along an axis that is off by 1.1e-6 of the
-// largest, and places below 2.25 add 1.1e-6 to it. Of a distance whose square could vanish nothing is listed.
+// Displacements are rounded to floats, interpolated and subtracted: along an axis the error is at most 1.1e-6 of the
+// largest displacement, and positions below 2.25 add 1.1e-6. Distances whose square could vanish list nothing.
 void Drift::listed_within(double distance, double separation) {
   const double surely = distance * scale_ * (1 - 1e-6) - 4e-6 * largest_;
   listed_ = surely > 1e-15 ? static_cast<float>(surely) : 0;

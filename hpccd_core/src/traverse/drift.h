@@ -17,20 +17,21 @@ namespace hpccd {
 
 class Drift {
  public:
-  // From a snapshot. In coordinates of its own: motions that begin far away, whose boxes have others, come in between.
+  // Starts from a snapshot, in coordinates of its own: motions that begin far away, with other box coordinates, may
+  // come in between.
   void begin(const Tree& tree, const std::vector<Vec3<double>>& snapshot, ThreadPool& pool);
-  // Of a motion of the same vertices.
+  // Fits the drift to a motion of the same vertices.
   void fit(const Tree& tree, const std::vector<VertexMotion>& motion, const std::vector<Vec3<double>>& snapshot,
            ThreadPool& pool);
-  // All pairs are listed that were within `distance` and a separation of each other, of which there is none larger.
+  // States that all pairs within `distance` and a separation of each other are listed; `separation` is the largest one.
   void listed_within(double distance, double separation);
 
-  // Whether two features of these nodes may touch up to a time that are not listed; a == b: two of one node.
+  // Whether unlisted features of these two nodes may touch up to a time. a == b: two features of one node.
   bool may_touch(std::uint32_t a, std::uint32_t b, float until) const;
   std::size_t bytes() const;
 
  private:
-  // x y z and a zero.
+  // x y z and padding.
   struct Ends {
     Floats4 t0, t1;
   };
@@ -59,8 +60,9 @@ class Drift {
   float listed_ = 0, reach_ = 0;
 };
 
-// Features go on straight lines. So of where they were to each other they are farthest at one of both ends, and those
-// in the same order along an axis at both are apart throughout. True where a number is not one.
+// Features move on straight lines. Relative to each other they are farthest from their initial configuration at one of
+// both ends, and features in the same order along an axis at both ends are separated throughout. Also true if a number
+// is NaN.
 inline bool Drift::may_touch(std::uint32_t a, std::uint32_t b, float time) const {
   const Ways p = ways_[a].until(time), q = ways_[b].until(time);
   const auto go_apart = [](Floats4 low_a, Floats4 high_a, Floats4 low_b, Floats4 high_b) {

@@ -14,19 +14,19 @@ namespace hpccd {
 
 class Excess {
  public:
-  // None.
+  // No excess.
   Excess() = default;
-  // There is none if all pairs have one separation, and if gaps of the scene are shortened (squeezed_axis.h): then
-  // boxes have grown by less than their separation. Both arguments must not change.
+  // The excess is zero if all pairs have one separation, and if gaps of the scene are shortened (squeezed_axis.h): then
+  // boxes have grown by less than their separation. The arguments must not change.
   Excess(const MotionBounds& motion, const SeparationTable& separations) {
     if (!motion.grown || separations.uniform() || !motion.squeezed.empty()) return;
     motion_ = &motion, separations_ = separations.of_pairs();
   }
 
   bool any() const { return motion_; }
-  // In coordinates of the boxes, rounded down. Coordinates lie within 6.25 and were rounded to floats, and so are their
-  // differences from the excess: by 7.2e-7 at most. Within one mesh it is less than the width of the box of a vertex,
-  // so that a vertex shared by two leaves stays near both.
+  // In coordinates of the boxes, rounded down. Coordinates are within 6.25 and were rounded to floats, and so are their
+  // differences from the excess: errors are 7.2e-7 at most. Within one mesh the excess is less than the width of the
+  // box of a vertex, so that a vertex shared by two leaves stays near both.
   float of(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     if (mesh_a == mixed_meshes || mesh_b == mixed_meshes) return 0;
     const double grown_by = motion_->margin_of_mesh(mesh_a) + motion_->margin_of_mesh(mesh_b);

@@ -5,7 +5,7 @@
 
 namespace hpccd {
 
-// Of far_pairs.inl, compiled for each instruction set.
+// The functions of far_pairs.inl, compiled for each instruction set.
 HPCCD_IN_EACH_SET(void far_pairs(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, float,
                                  CandidateBuffer&, CandidateBuffer&);)
 

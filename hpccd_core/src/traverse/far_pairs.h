@@ -7,9 +7,9 @@
 
 namespace hpccd {
 
-// As leaf_pairs_in_snapshot(), whose boxes tell much where leaves are near: there `reach` cuts a piece from them. Far
-// away it covers them whole, and features are compared along the direction in which their boxes are apart. That costs
-// more than boxes do, and a tenth of the test of a pair.
+// Like leaf_pairs_in_snapshot(), for leaves that are far apart. For near leaves, boxes grown by `reach` exclude much of
+// the other leaf. For far ones they cover it whole, so features are compared along the direction that separates the
+// leaves. This costs more than boxes, and a tenth of the test of a pair.
 LeafPairsInSnapshot far_pairs(Simd simd);
 
 }  // namespace hpccd

@@ -19,8 +19,8 @@ HPCCD_HD Single load(const float* x) {
   return r;
 }
 
-// The features of a leaf that have n corners each, with their boxes: a row for each coordinate, filled up with copies
-// of the last feature.
+// The features of a leaf with n corners each, and their boxes: one row per coordinate, padded with copies of the last
+// feature.
 template <std::uint32_t n>
 struct FeatureRows {
   static constexpr std::uint32_t most = n == 2 ? CornersOf::most_edges : n == 3 ? CornersOf::most_faces : 32;
@@ -49,11 +49,11 @@ struct FeatureRows {
   HPCCD_HD std::uint32_t padded() const { return (size + lanes - 1) / lanes * lanes; }
 };
 
-// Below it products of squares are no normal numbers, and say nothing.
+// Below this, products of squares are denormal and not reliable.
 constexpr float least_square = 1e-20f;
 
-// Bit j: feature j of b is not certainly farther from feature i of a than the root of `square`: boxes
-// lie apart along a direction, and along it the features are farther apart than their boxes.
+// Bit j: feature j of b is not certainly farther from feature i of a than the root of `square`. If their boxes are
+// apart along a direction, the features are farther apart along it than the boxes.
 template <std::uint32_t n_a, std::uint32_t n_b>
 HPCCD_HD unsigned near_features(const FeatureRows<n_a>& a, std::uint32_t i, const FeatureRows<n_b>& b, float square) {
   unsigned near = 0;
@@ -90,7 +90,7 @@ HPCCD_HD void add_near(const FeatureRows<n_a>& a, const std::uint32_t* numbers_a
 
 }  // namespace
 
-// What a gap along a direction may be off by: leaf_hulls.cpp.
+// Errors of a gap along a direction: see leaf_hulls.cpp.
 void far_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures, float reach,
                CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
   constexpr float rounding = 2e-6f;
@@ -111,7 +111,7 @@ void far_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedF
   const std::uint32_t *corners = tree.corners.data(), *edges = tree.edge_of_slot.data(),
                       *faces = tree.face_of_slot.data();
   if (a.n_edges() && b.n_edges()) {
-    // Of two edges the one with the lower number comes first: all of the mesh that comes first.
+    // Of two edges the one with the lower number comes first, which is that of the mesh with the lower number.
     const bool in_order = edges[a.first_edge] < edges[b.first_edge];
     const LeafRange &first = in_order ? a : b, &second = in_order ? b : a;
     add_near(edges_of(first, features_of(first)), edges + first.first_edge, edges_of(second, features_of(second)),

@@ -1,4 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/simd/avx2.h"
-// After it: written against the instruction set.
+// Must come after the header of the instruction set.
 #include "traverse/far_pairs.inl"

@@ -171,7 +171,7 @@ void FineBoxes::add_near(const LeafRange& a, const LeafRange& b, double distance
   const bool same = &a == &b;
   const Bounds& box = nodes_[tree_.leaf_nodes[static_cast<std::size_t>(&a - tree_.leaves.data())]];
   const LeafCorners corners_a(tree_, snapshot_, a, box.low), corners_b(tree_, snapshot_, b, box.low);
-  // Differences of coordinates, products with a unit vector and their sums: each has a relative error of 1.1e-16.
+  // Differences of coordinates, products with a unit vector and their sums each have a relative error of 1.1e-16.
   const double reach = distance * (1 + 1e-14) + 4e-15 * (corners_a.largest + corners_b.largest);
   const Direction direction = same ? Direction() : direction_between(corners_a, corners_b, reach);
   if (direction.apart) return;

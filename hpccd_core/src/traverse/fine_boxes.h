@@ -14,14 +14,14 @@ namespace hpccd {
 
 class FineBoxes {
  public:
-  // Both must outlive it.
+  // The arguments must outlive the object.
   FineBoxes(const Tree& tree, const MotionBounds& snapshot);
 
   // The square of the distance of the boxes of two nodes, by number.
   double square_of_gap(std::uint32_t a, std::uint32_t b) const;
   // Whether the boxes of two nodes are certainly farther apart than a distance.
   bool farther_apart(std::uint32_t a, std::uint32_t b, double distance) const;
-  // The pairs of features of two leaves, or of one, that have no vertex in common and are not certainly farther apart
+  // Appends the pairs of features of two leaves, or of one, that share no vertex and are not certainly farther apart
   // than a distance.
   void add_near(const LeafRange& a, const LeafRange& b, double distance, CandidateBuffer& edge_edge,
                 CandidateBuffer& vertex_face) const;

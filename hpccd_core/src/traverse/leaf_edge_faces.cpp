@@ -5,7 +5,7 @@
 
 namespace hpccd {
 
-// Of leaf_edge_faces.inl, compiled for each instruction set.
+// The functions of leaf_edge_faces.inl, compiled for each instruction set.
 HPCCD_IN_EACH_SET(void leaf_edge_faces(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&);)
 
 LeafEdgeFaces leaf_edge_faces(Simd simd) { return HPCCD_OF_SET(simd, leaf_edge_faces); }

@@ -7,7 +7,7 @@
 
 namespace hpccd {
 
-// Edges of each leaf against faces of the other to `edge_face`, edge first. a == b: pairs within one leaf.
+// Appends edges of each leaf paired with faces of the other to `edge_face`, edge first. a == b: pairs within one leaf.
 using LeafEdgeFaces = void (*)(const Tree& tree, const LeafRange& a, const LeafRange& b, CandidateBuffer& edge_face);
 
 LeafEdgeFaces leaf_edge_faces(Simd simd);

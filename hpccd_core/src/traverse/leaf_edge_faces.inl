@@ -9,7 +9,7 @@ namespace {
 #include "traverse/candidate_rows.inl"
 #include "traverse/sharing.inl"
 
-// These edges of a against these faces of b: one by one the faces, of which a leaf has fewer.
+// Pairs these edges of a with these faces of b. The loop is over the faces, of which a leaf has fewer.
 template <class A, class B>
 [[gnu::noinline]] void edges_against_faces(const LeafFeatures& a, const LeafFeatures& b,
                                            const typename A::Lanes& lanes_a, const Sharing& shared, unsigned edges_a,
@@ -41,7 +41,7 @@ void leaf_edge_faces(const Tree& tree, const LeafRange& a, const LeafRange& b, C
     const typename A::Outcodes near_a({}, leaf_a, lanes_a, bounds_of(node_b));
     const unsigned edges_a = near_a.edges(leaf_a), faces_a = near_a.faces(leaf_a);
     Sharing a_with_b, b_with_a;
-    if constexpr (std::is_same_v<A, B>)  // else the leaves are two
+    if constexpr (std::is_same_v<A, B>)  // otherwise the leaves differ
       if (&a == &b) {
         find_own(leaf_a, a_with_b);
         return edges_against_faces<A, A>(leaf_a, leaf_a, lanes_a, a_with_b, edges_a, faces_a, edge_face);

@@ -10,7 +10,7 @@ HPCCD_HD constexpr std::uint32_t high(std::uint32_t end, std::uint32_t axis) {
   return bound_number(end, Side::high, axis);
 }
 
-// A box to compare with: its bounds, in the order of bound_number, each `stride` numbers behind the one before.
+// Bounds of a box to compare with, in the order of bound_number, each `stride` numbers after the previous one.
 template <std::uint32_t stride>
 struct Bounds {
   const float* at;
@@ -24,15 +24,15 @@ struct FeatureBox {
   HPCCD_HD float operator[](std::uint32_t row) const { return at[row]; }
 };
 
-// Some corners: low and high bounds by 3 * end + axis; the same where nothing has grown.
+// Some corners: low and high bounds by 3 * end + axis. Both are the same array if boxes have not grown.
 struct Corners {
   Row low[Tree::coordinates], high[Tree::coordinates];
 };
 
-// What it means to lie beyond a box, below or above it along each axis. Through the whole motion (MotionBox::overlaps):
+// When a corner lies beyond a box, below or above it along each axis. Throughout the motion (MotionBox::overlaps):
 struct BothEnds {
-  static constexpr bool grows = false;      // whether corners become boxes when they are loaded
-  static constexpr std::uint32_t sets = 1;  // of six sides
+  static constexpr bool grows = false;      // whether corners are grown to boxes when they are loaded
+  static constexpr std::uint32_t sets = 1;  // six sides
   template <class Box>
   HPCCD_HD const Box& bounds(const Box& b) const {
     return b;
@@ -48,8 +48,8 @@ struct BothEnds {
   }
 };
 
-// Up to a time (Node::overlap_until): in place of the second end boxes are those of that time, of which the corners'
-// grow once.
+// Up to a time (Node::overlap_until): boxes at that time take the place of the second end; those of the corners grow
+// once.
 struct Until {
   static constexpr bool grows = true;
   static constexpr std::uint32_t sets = 1;
@@ -76,11 +76,11 @@ struct Until {
   }
 };
 
-// For the whole motion, if boxes of two meshes have grown by more than their separation requires (traverse/excess.h):
-// the boxes of the corners shrink again.
+// Throughout the motion, if boxes of two meshes have grown by more than their separation requires (traverse/excess.h):
+// the boxes of the corners shrink by the excess.
 struct LessExcess : BothEnds {
   static constexpr bool grows = true;
-  static constexpr bool only_grown = true;  // without grown boxes there is no excess
+  static constexpr bool only_grown = true;  // boxes that have not grown have no excess
   float excess;
   HPCCD_HD void grow(Corners& c) const {
     for (std::uint32_t row = 0; row < Tree::coordinates; ++row)
@@ -88,7 +88,7 @@ struct LessExcess : BothEnds {
   }
 };
 
-// At the start, where boxes may also be as far apart as `reach` (Node::near_at_start).
+// At the start of the motion; boxes may be up to `reach` apart (Node::near_at_start).
 struct AtStart {
   static constexpr bool grows = true;
   static constexpr std::uint32_t sets = 1;
@@ -110,8 +110,8 @@ struct AtStart {
   }
 };
 
-// In one snapshot, where boxes may also be as far apart as `reach` (Node::near_in_snapshot): along the axes and along
-// the slanted directions.
+// In one snapshot; boxes may be up to `reach` apart (Node::near_in_snapshot), along the axes and along the slanted
+// directions.
 struct InSnapshot {
   static constexpr bool grows = true;
   static constexpr std::uint32_t sets = 2;
@@ -136,12 +136,12 @@ struct InSnapshot {
   }
 };
 
-// The same where they must touch.
+// The same for boxes that must touch.
 struct TouchingInSnapshot : InSnapshot {
   static constexpr bool grows = false;
 };
 
-// A leaf's features. Plain pointers: what is more than data() of a std::vector, compiled here, could be linked into
+// A leaf's features, as plain pointers: any function of std::vector beyond data(), compiled here, could be linked into
 // code for older processors.
 struct LeafFeatures {
   const CornerRow* rows;
@@ -165,19 +165,19 @@ struct LeafFeatures {
 
 HPCCD_HD constexpr std::uint32_t first_bits(std::uint32_t n) { return n >= 32 ? ~0u : (1u << n) - 1; }
 
-// f(number) for each bit.
+// Calls f(number) for each bit that is set.
 template <class Function>
 HPCCD_HD void for_each(unsigned bits, Function&& f) {
   for (; bits; bits &= bits - 1) f(static_cast<std::uint32_t>(__builtin_ctz(bits)));
 }
 
-// How a leaf is read: with one or two groups of corners, whose boxes have grown or not (Tree::grown).
+// How a leaf is read: with one or more groups of corners, with boxes that have grown or not (Tree::grown).
 template <class When, bool many, bool grown>
 struct Leaves {
   static constexpr std::uint32_t groups = many ? 2 : 1;
   static constexpr std::uint32_t high_rows = grown ? Tree::coordinates : 0, next_group = high_rows + Tree::coordinates;
 
-  // Its corners, as boxes where they grow when they are loaded.
+  // The corners of a leaf, grown to boxes when they are loaded if necessary.
   struct Lanes {
     static constexpr bool own = When::grows;
     static constexpr std::uint32_t high_rows = own ? Tree::coordinates : Leaves::high_rows,
@@ -211,7 +211,7 @@ struct Leaves {
     }
   };
 
-  // On which sides of a box they lie.
+  // On which sides of a box corners lie.
   struct Outcodes {
     Bytes16 of[When::sets][groups];
 
@@ -228,7 +228,7 @@ struct Leaves {
         for (std::uint32_t s = 0; s < When::sets; ++s) of[s][g] = to_bytes(bits[s]);
       }
     }
-    // Bit j: feature j of sixteen, whose corners stand in `which`, lies beyond no side.
+    // Bit j: feature j of sixteen, whose corners are numbered by `which`, has no side beyond which all its corners lie.
     template <std::uint32_t n>
     HPCCD_HD unsigned near16(const std::uint8_t* const (&which)[n]) const {
       Bytes16 beyond;
@@ -268,7 +268,7 @@ struct Leaves {
       return picked(of[0], load_bytes(which));
   }
 
-  // The box of one corner, where it lies.
+  // The box of one corner, read in place.
   struct CornerBox {
     const CornerRow* rows;
     std::uint32_t lane;
@@ -301,8 +301,8 @@ struct Leaves {
   }
 };
 
-// The boxes of a leaf's edges or faces, which have n corners each: where lanes can be picked at once all of them, else
-// one by one.
+// The boxes of a leaf's edges or faces with n corners each: all of them at once where the kernel can permute lanes,
+// otherwise one by one.
 template <class Kernel, std::uint32_t n>
 class FeatureBoxes {
   static constexpr std::uint32_t most = n == 2 ? CornersOf::most_edges : CornersOf::most_faces;
@@ -339,11 +339,11 @@ class FeatureBoxes {
   }
 
   const LeafFeatures& leaf_;
-  const std::uint8_t* corner_;  // row by row, `most` in each
+  const std::uint8_t* corner_;  // row by row, `most` numbers per row
   alignas(64) float bounds_[picks_at_once ? n_bounds : 1][most];
 };
 
-// Calls f with how each of them is to be read.
+// Calls f with the type that describes how the leaves are read.
 template <class When, class Function>
 HPCCD_HD void with_kernels(const Tree& tree, const LeafFeatures& a, const LeafFeatures& b, Function&& f) {
   const auto with = [&](auto grown) {

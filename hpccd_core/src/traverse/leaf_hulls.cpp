@@ -15,7 +15,7 @@ using V = Vec3<float>;
 
 Floats4 all4(float x) { return Floats4{x, x, x, x}; }
 
-// The corner that is farthest along a direction; of several any.
+// The farthest corner along a direction; any of them if there are several.
 V farthest(const Tree& tree, const LeafRange& leaf, const V& along) {
   const CornerRow* rows = tree.rows_of(leaf);
   const Floats4 m[3] = {all4(along.x), all4(along.y), all4(along.z)};
@@ -51,19 +51,19 @@ bool far_apart(const Node& a, const Node& b, float reach) {
   return size < reach;
 }
 
-// Gilbert's walk (1966) to the point of all differences between them that is nearest to zero: each step gives a
-// direction along which they may be apart, and a difference that tells how near they are at least.
+// Gilbert's algorithm (1966) for the point of the Minkowski difference that is nearest to zero: each step gives a
+// direction along which the hulls may be apart, and a lower bound on their distance.
 //
-// What a gap along a direction may be off by: corners were rounded to floats, 1.2e-7 along each axis and 4.2e-7 of two
-// along any direction; products with it and their sums, of 3.9 at most, 7e-7 each; their difference 4.7e-7. That is
-// 2.3e-6, of which reach_of() has 1e-6, as it has what is relative: the length of the direction.
+// Errors of a gap along a direction: corners were rounded to floats, 1.2e-7 along each axis and 4.2e-7 for two corners
+// along any direction; products and their sums, of 3.9 at most, 7e-7 each; their difference 4.7e-7. The sum is 2.3e-6.
+// reach_of() accounts for 1e-6 of it, and for the relative error of the length of the direction.
 bool farther_apart(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach) {
   constexpr float rounding = 2e-6f;
   constexpr int most_steps = 6;
   V v = middle(node_of(tree, b).box.t0) - middle(node_of(tree, a).box.t0);
   for (int step = 0; step < most_steps; ++step) {
     const float length = std::sqrt(dot(v, v));
-    if (!(length > reach)) return false;  // after the first step: of two points of them
+    if (!(length > reach)) return false;  // after the first step: of two points of the difference
     const V along = (1 / length) * v;
     const V difference = farthest(tree, b, -1.0f * along) - farthest(tree, a, along);
     if (dot(difference, along) > reach + rounding) return true;
@@ -71,7 +71,7 @@ bool farther_apart(const Tree& tree, const LeafRange& a, const LeafRange& b, flo
       v = difference;
       continue;
     }
-    // The nearest point between both.
+    // The nearest point on the segment between both.
     const V way = difference - v;
     const float square = dot(way, way), part = -dot(v, way);
     if (!(part > 0)) return false;

@@ -5,7 +5,7 @@
 
 namespace hpccd {
 
-// Of leaf_pairs.inl, compiled for each instruction set.
+// The functions of leaf_pairs.inl, compiled for each instruction set.
 HPCCD_IN_EACH_SET(std::uint32_t block_pairs(const Tree&, const Block&, const Block&, LeafPair*);
                   void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, CandidateBuffer&,
                                   CandidateBuffer&);

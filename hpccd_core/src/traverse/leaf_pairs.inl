@@ -9,8 +9,8 @@ namespace {
 #include "traverse/candidate_rows.inl"
 #include "traverse/sharing.inl"
 
-// From pair `begin` on: of two edges the one with the lower number comes first. By whole rows, into the room behind the
-// last pair: loops of a few turns cost more than what they do.
+// Orders the pairs from `begin` on: of two edges the one with the lower number comes first. Works on whole rows, into
+// the space beyond the last pair, since loops of a few iterations cost more than their work.
 HPCCD_HD void put_in_order(CandidateBuffer& out, std::uint32_t begin) {
   for (std::uint32_t row = begin; row < out.n; row += Tree::load_width)
     for (std::uint32_t i = row; i < row + Tree::load_width; ++i) {
@@ -19,8 +19,8 @@ HPCCD_HD void put_in_order(CandidateBuffer& out, std::uint32_t begin) {
     }
 }
 
-// These edges of a, one by one, against these edges of b. Not inlined, as the next: copies of both in each caller made
-// the compiler take half as long again and no scene faster.
+// Pairs these edges of a, one by one, with these edges of b. Not inlined, like the next function: copies of both in
+// each caller increased compile time by half and made no scene faster.
 template <class A, class B, class When>
 [[gnu::noinline]] void edge_pairs(When when, const LeafFeatures& a, const LeafFeatures& b,
                                   const typename B::Lanes& lanes_b, const Sharing& shared, unsigned edges_a,
@@ -39,7 +39,7 @@ template <class A, class B, class When>
   put_in_order(out, begin);
 }
 
-// These vertices of a, one by one, against these faces of b. `shared` may be missing.
+// Pairs these vertices of a, one by one, with these faces of b. `shared` may be null.
 template <class A, class B, class When>
 [[gnu::noinline]] void vertex_face_pairs(When when, const LeafFeatures& a, const LeafFeatures& b,
                                          const typename B::Lanes& lanes_b, const Sharing* shared, unsigned vertices_a,
@@ -66,7 +66,7 @@ HPCCD_HD void pairs_within(When when, const LeafFeatures& leaf, TestedFeatures t
   vertex_face_pairs<Kernel, Kernel>(when, leaf, leaf, lanes, &own, vertices, first_bits(leaf.n_faces), vertex_face);
 }
 
-// Only what is near the other leaf's box is looked at one by one.
+// Loops only over features near the other leaf's box.
 template <class A, class B, class When>
 HPCCD_HD void pairs_between(When when, const LeafFeatures& a, const LeafFeatures& b, const Node& node_a,
                             const Node& node_b, TestedFeatures tested, CandidateBuffer& edge_edge,
@@ -80,14 +80,14 @@ HPCCD_HD void pairs_between(When when, const LeafFeatures& a, const LeafFeatures
   Sharing a_with_b, b_with_a;
   if (edges) {
     if (neighbours) find_shared(a, near_a.corners(a), b, near_b.corners(b), a_with_b, b_with_a);
-    // One by one the fewer.
+    // Loops over the smaller set.
     if (__builtin_popcount(edges_a) <= __builtin_popcount(edges_b))
       edge_pairs<A, B>(when, a, b, lanes_b, a_with_b, edges_a, edges_b, edge_edge);
     else
       edge_pairs<B, A>(when, b, a, lanes_a, b_with_a, edges_b, edges_a, edge_edge);
   }
   if (!tested.vertex_face) return;
-  const bool known = edges || !neighbours;  // not worth finding for a few vertices
+  const bool known = edges || !neighbours;  // not worth computing for a few vertices
   const unsigned faces_a = near_a.faces(a), faces_b = near_b.faces(b);
   if (faces_b)
     vertex_face_pairs<A, B>(when, a, b, lanes_b, known ? &a_with_b : nullptr, near_a.vertices(a), faces_b, vertex_face);
@@ -95,7 +95,7 @@ HPCCD_HD void pairs_between(When when, const LeafFeatures& a, const LeafFeatures
     vertex_face_pairs<B, A>(when, b, a, lanes_a, known ? &b_with_a : nullptr, near_b.vertices(b), faces_a, vertex_face);
 }
 
-// Sixteen boxes of leaves.
+// Boxes of sixteen leaves.
 struct BoxLanes {
   Rows16<n_bounds> rows;
   HPCCD_HD explicit BoxLanes(const float (&at)[n_bounds][Block::width]) : rows(load_rows(at)) {}
@@ -113,7 +113,7 @@ struct BoxLanes {
   }
 };
 
-// Along a direction of their k-DOPs.
+// Separated along a direction of their k-DOPs.
 HPCCD_HD bool are_apart(const Kdop& a, const Kdop& b) {
   return any_in_both_halves(less(load16(a.high), load16(b.low)), less(load16(b.high), load16(a.low)));
 }
@@ -128,13 +128,13 @@ HPCCD_HD void pairs_of_leaves(When when, const Tree& tree, const LeafRange& a, c
   with_kernels<When>(tree, leaf_a, leaf_b, [&](auto of_a, auto of_b) {
     using A = decltype(of_a);
     using B = decltype(of_b);
-    if constexpr (std::is_same_v<A, B>)  // else the leaves are two
+    if constexpr (std::is_same_v<A, B>)  // otherwise the leaves differ
       if (&a == &b) return pairs_within<A>(when, leaf_a, tested, edge_edge, vertex_face);
     pairs_between<A, B>(when, leaf_a, leaf_b, node_a, node_b, tested, edge_edge, vertex_face);
   });
 }
 
-// less(bounds): a box that counts in place of another.
+// less(bounds): a box that replaces the leaf's own.
 template <class Less>
 HPCCD_HD std::uint32_t pairs_of_blocks(Less&& less, const Tree& tree, const Block& a, const Block& b, LeafPair* pairs) {
   const Node* nodes = tree.nodes.data();

@@ -10,10 +10,10 @@
 
 namespace hpccd {
 
-// The distance of two vertices below two nodes of different meshes, by number, which some pair of their features is no
-// farther apart than. Goes down where boxes are nearest, so it is mostly little above the smallest. Infinity where the
-// vertices it comes to have no features that are tested against each other.
-// `fine`: for scenes in which floats do not distinguish features; otherwise null.
+// The distance of two vertices below two nodes (by number) of different meshes: an upper bound on the smallest distance
+// of their features. Descends to the nearest boxes, so the bound is mostly tight. Infinity if the vertices that it
+// reaches have no features that are tested against each other. `fine`: for scenes in which floats do not distinguish
+// features; otherwise null.
 double distance_of_near_corners(const Tree& tree, const MotionBounds& snapshot, const FineBoxes* fine, std::uint32_t a,
                                 std::uint32_t b);
 

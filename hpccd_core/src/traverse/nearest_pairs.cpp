@@ -11,8 +11,8 @@
 namespace hpccd {
 namespace {
 
-// The relative amount by which the test may report a pair beyond its distance (proximity_test.h), including its
-// margins. With less, the order of the pairs would decide which of two is found.
+// The relative amount by which the test may report a pair beyond its distance (proximity_test.h), with its margins.
+// With less, the order of the pairs would affect which of two pairs is found.
 constexpr double test_rounding = distance_radius + 1e-14;
 
 }  // namespace
@@ -61,7 +61,7 @@ bool NearestPairs::offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const Neare
     entry.limit.store(-1, std::memory_order_relaxed);
     entry.reach.store(0, std::memory_order_relaxed);
   } else {
-    // Pairs at the same distance are still wanted, one of which is the first in order.
+    // Pairs at the same distance are still needed: one of them is the first in canonical order.
     limit(entry, pair.distance * (1 + 1e-14) + rounding(mesh_a, mesh_b));
   }
   return true;
@@ -74,8 +74,8 @@ void NearestPairs::begin(std::uint32_t a, std::uint32_t b) {
   const double distance = distance_of_near_corners(tree_, motion_, fine_.get(), a, b);
   if (!(distance < std::numeric_limits<double>::infinity())) return;
   const std::lock_guard lock(entry.lock);
-  // The nearest pair may be computed to be farther apart than that by what the test rounds, and is to be found as if
-  // there were no limit.
+  // The computed distance of the nearest pair may exceed the limit by the rounding of the test; the pair must be found
+  // as if there were no limit.
   limit(entry, distance * (1 + 1e-14) + 2 * rounding(mesh_a, mesh_b));
 }
 

@@ -22,49 +22,50 @@ struct NearestPair {
   Kind kind = Kind::edge_face;
   std::uint32_t first = 0xFFFFFFFFu, second = 0xFFFFFFFFu;
 
-  // An edge and a face that intersect come first, then what is nearer, then the canonical order.
+  // Order of results: edges and faces that intersect first, then by distance, then canonical order.
   bool before(const NearestPair& other) const;
 };
 
 class NearestPairs {
  public:
-  // All of them must outlive it.
+  // The arguments must outlive the object.
   NearestPairs(const MeshPairs& pairs, const Features& features, const MotionBounds& motion, const Tree& tree);
 
-  // Farther apart along an axis than this, in coordinates of the boxes, is nothing that could come before.
+  // Features farther apart than this along an axis, in coordinates of the boxes, cannot improve the result.
   float reach(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     if (mesh_a == mixed_meshes || mesh_b == mixed_meshes) return std::numeric_limits<float>::infinity();
     return at(mesh_a, mesh_b).reach.load(std::memory_order_relaxed);
   }
-  // Vertex-face and edge-edge pairs beyond this distance could not come before; below 0: none could.
+  // Vertex-face and edge-edge pairs beyond this distance cannot improve the result; below 0: no pair can.
   double limit(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     return at(mesh_a, mesh_b).limit.load(std::memory_order_relaxed);
   }
-  // Whether two nodes of the tree, by number, hold an edge that would come before one that was found to pierce a face.
-  // Where much pierces, this ends the search soon.
+  // Whether two nodes of the tree, by number, contain an edge that comes before the first one found to intersect a
+  // face. With many intersections this ends the search early.
   bool may_come_before(std::uint32_t a, std::uint32_t b) const {
     const std::uint32_t mesh_a = tree_.nodes[a].mesh, mesh_b = tree_.nodes[b].mesh;
     if (mesh_a == mixed_meshes || mesh_b == mixed_meshes) return true;
     return least_edge(a, b) <= at(mesh_a, mesh_b).piercing_edge.load(std::memory_order_relaxed);
   }
-  // In double precision, if floats hardly distinguish features; otherwise null.
+  // Boxes in double precision, if floats hardly distinguish features; otherwise null.
   const FineBoxes* fine() const { return fine_.get(); }
-  // The lowest number of an edge in either.
+  // The lowest edge number in either node.
   std::uint32_t least_edge(std::uint32_t a, std::uint32_t b) const { return std::min(least_edge_[a], least_edge_[b]); }
   std::uint32_t mesh_of(std::uint32_t vertex) const { return features_.mesh_of_vertex[vertex]; }
-  // Whether it comes before what was found so far.
+  // Offers a pair; returns whether it improves the result.
   bool offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair);
-  // When two meshes are met first, with these nodes: what is farther apart than two of their vertices is left out.
+  // Called at the first visit of two meshes, with these nodes: an upper bound from two of their vertices excludes pairs
+  // that are farther apart.
   void begin(std::uint32_t a, std::uint32_t b);
-  // After the search, in the order of the pairs.
+  // The results after the search, in the order of the pairs.
   const MeshPairs& pairs() const { return pairs_; }
   const NearestPair& found(std::size_t number) const { return entries_[number].best; }
 
  private:
   struct Entry {
     std::atomic<float> reach{std::numeric_limits<float>::infinity()};
-    std::atomic<double> limit{1e307};  // beyond all coordinates; finite: margins are computed with it
-    std::atomic<std::uint32_t> piercing_edge{0xFFFFFFFFu};  // of the pair of edge and face that comes first so far
+    std::atomic<double> limit{1e307};  // beyond all coordinates; finite, since margins are computed with it
+    std::atomic<std::uint32_t> piercing_edge{0xFFFFFFFFu};  // the first pair of edge and face so far
     std::atomic<bool> begun{false};
     SpinLock lock;
     NearestPair best;

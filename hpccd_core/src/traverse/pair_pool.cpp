@@ -21,7 +21,7 @@ PairPool::PairPool(const Tree& tree, const std::vector<NodePair>& pairs, int thr
 }
 
 void PairPool::push_half(std::vector<NodePair>& stack) {
-  // Below this a pair costs less than handing it over.
+  // Below this a pair costs less than its transfer.
   constexpr int worth_moving = 16 * Tree::leaf_size;
   const std::size_t half = stack.size() / 2;
   if (half == 0 || tree_.nodes[stack[0].a].primitives + tree_.nodes[stack[0].b].primitives < worth_moving) return;
@@ -48,11 +48,11 @@ bool PairPool::pop_one(int thread, std::vector<NodePair>& stack) {
   return true;
 }
 
-// No pair is lost: whoever gives one away asks for another before it ends.
+// No pair is lost: a thread that gives pairs away asks for another one before it ends.
 bool PairPool::wait(int thread, std::vector<NodePair>& stack) {
   bool got = false;
   for (ActiveWait wait; !got && !abandoned_;) {
-    // Busy first: a thread that gives stays busy until it has given.
+    // Read `busy` first: a thread that gives pairs stays busy until it has given them.
     const bool all_idle = busy_ == 0;
     if (waiting_pairs_ > 0)
       got = pop_one(thread, stack);

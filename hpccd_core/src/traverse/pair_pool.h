@@ -15,17 +15,17 @@ namespace hpccd {
 
 class PairPool {
  public:
-  // Each thread begins with the pairs that lie in its part of the leaves, which it has refitted (parallel_for).
+  // Each thread starts with the pairs in its part of the leaves, which it has refitted (parallel_for).
   PairPool(const Tree& tree, const std::vector<NodePair>& pairs, int threads);
 
-  // True while some thread has nothing to do.
+  // Whether some thread is idle.
   bool wanted() const { return hungry_.load(std::memory_order_relaxed) > 0; }
 
-  // Moves the older half of a stack here, where it holds work worth moving.
+  // Moves the older half of a stack to the pool, if it contains enough work.
   void push_half(std::vector<NodePair>& stack);
 
-  // Puts a pair on the empty stack; where others may still give one, does `meanwhile()` and waits. False: everything is
-  // done. The caller counts as busy until it asks again.
+  // Puts a pair on the empty stack. While others may still give one, calls `meanwhile()` and waits. False: all work is
+  // done. The caller counts as busy until the next call.
   template <class Meanwhile>
   bool pop(int thread, std::vector<NodePair>& stack, Meanwhile&& meanwhile) {
     if (pop_one(thread, stack)) return true;
@@ -36,7 +36,7 @@ class PairPool {
     return got;
   }
 
-  // After an exception: all others stop.
+  // Stops all other threads after an exception.
   void abandon() { abandoned_ = true; }
 
  private:
@@ -44,10 +44,11 @@ class PairPool {
   bool wait(int thread, std::vector<NodePair>& stack);
 
   const Tree& tree_;
-  // Read between any two pairs: on a cache line that changes when a thread runs dry, not with each pair handed over.
+  // Read between any two pairs, so it is on a cache line that changes only when a thread runs out of work, not with
+  // each transferred pair.
   alignas(64) std::atomic<int> hungry_{0};
   alignas(64) SpinLock lock_;
-  std::vector<std::vector<NodePair>> lists_;  // of each thread, then those given away
+  std::vector<std::vector<NodePair>> lists_;  // initial pairs of each thread, then those given away
   std::atomic<std::size_t> waiting_pairs_;
   std::atomic<int> busy_{0};
   std::atomic<bool> abandoned_{false};
@@ -55,7 +56,7 @@ class PairPool {
   friend class BusyThread;
 };
 
-// One thread's part in the work, whichever way it ends.
+// Registers one thread as busy until it ends, also by an exception.
 class BusyThread {
  public:
   BusyThread(PairPool& pool, int thread) : pool_(pool), thread_(thread) {}
@@ -65,7 +66,7 @@ class BusyThread {
   BusyThread(const BusyThread&) = delete;
   BusyThread& operator=(const BusyThread&) = delete;
 
-  // As PairPool::pop.
+  // See PairPool::pop.
   template <class Meanwhile>
   bool next(std::vector<NodePair>& stack, Meanwhile&& meanwhile) {
     if (busy_) --pool_.busy_;

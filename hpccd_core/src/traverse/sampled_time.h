@@ -11,7 +11,8 @@ namespace hpccd {
 
 class SampledTime {
  public:
-  // Does the work. `number`: how many times before; `elsewhere`: seconds that grow meanwhile and belong to others.
+  // Does the work. `number`: count of previous calls. `elsewhere`: seconds that increase meanwhile and do not belong to
+  // this work.
   template <class Work>
   void run(std::uint64_t number, const double& elsewhere, Work&& work) {
     if (number % every != 0) return work();

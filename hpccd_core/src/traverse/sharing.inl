@@ -6,9 +6,9 @@
 
 #include "traverse/leaf_features.inl"
 
-// The features of a leaf that have a vertex, if that is one of these corners of it.
+// The features of a leaf that contain a vertex, if it is one of these corners of the leaf.
 struct FeaturesAt {
-  std::uint32_t corner;  // or one that no leaf has
+  std::uint32_t corner;  // a vertex, or a number that no leaf has
   std::uint32_t edges, faces;
 
   HPCCD_HD FeaturesAt(const LeafFeatures& leaf, unsigned corners, std::uint32_t vertex) {
@@ -23,7 +23,7 @@ struct FeaturesAt {
   static_assert(none >= CornersOf::most_corners);
 };
 
-// By corner of one leaf, the features of another that have it.
+// For each corner of one leaf, the features of another leaf that contain it.
 struct Sharing {
   std::uint32_t edges[FeaturesAt::none + 1] = {}, faces[FeaturesAt::none + 1] = {};
   HPCCD_HD void set(std::uint32_t corner, std::uint32_t with_edges, std::uint32_t with_faces) {
@@ -31,7 +31,7 @@ struct Sharing {
   }
 };
 
-// What two leaves share, of these corners of each.
+// Finds the vertices that two leaves share, among these corners of each.
 HPCCD_HD void find_shared(const LeafFeatures& a, unsigned corners_a, const LeafFeatures& b, unsigned corners_b,
                           Sharing& a_with_b, Sharing& b_with_a) {
   for_each(corners_a, [&](std::uint32_t i) {
@@ -41,7 +41,7 @@ HPCCD_HD void find_shared(const LeafFeatures& a, unsigned corners_a, const LeafF
   });
 }
 
-// What a leaf shares with itself.
+// The same for a leaf and itself.
 HPCCD_HD void find_own(const LeafFeatures& leaf, Sharing& own) {
   for (std::uint32_t i = 0; i < leaf.n_corners; ++i)
     own.set(i, leaf.corners_of->edges_at[i], leaf.corners_of->faces_at[i]);

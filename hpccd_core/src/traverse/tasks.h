@@ -15,7 +15,7 @@ struct NodePair {
   std::uint32_t a, b;  // a == b: pairs within the subtree
 };
 
-// Where a walk over the tree ends.
+// Where a traversal ends.
 struct AtLeaves {
   bool operator()(const Node& node) const { return !node.children; }
 };
@@ -23,7 +23,7 @@ struct AtBlocks {
   bool operator()(const Node& node) const { return Tree::in_block(node); }
 };
 
-// The pairs that follow from one whose boxes overlap and where the walk does not end.
+// Pushes the pairs that follow from a pair whose boxes overlap and at which the traversal does not end.
 template <class Ends, class Push>
 void refine(const std::vector<Node>& nodes, NodePair p, Ends ends, Push&& push) {
   const Node &a = nodes[p.a], &b = nodes[p.b];
@@ -33,7 +33,7 @@ void refine(const std::vector<Node>& nodes, NodePair p, Ends ends, Push&& push) 
     push(NodePair{a.children, a.children + 1});
     return;
   }
-  // The larger node gives way; equal ones go down together.
+  // The larger node is split; of equal ones both are.
   const bool split_a = !ends(a) && (ends(b) || a.primitives * 2 > b.primitives);
   const bool split_b = !ends(b) && (ends(a) || b.primitives * 2 > a.primitives);
   if (split_a && split_b) {
@@ -51,12 +51,12 @@ bool is_end(const std::vector<Node>& nodes, NodePair p, Ends ends) {
   return ends(nodes[p.a]) && ends(nodes[p.b]);
 }
 
-// Which boxes count: overlap(node, node) says whether two nodes may hold a pair. Through the whole motion:
+// Which boxes count: overlap(node, node) returns whether two nodes may contain a pair. For the whole motion:
 struct MotionBoxes {
   using Ends = AtLeaves;
-  static constexpr bool shrink = false;  // whether pairs that were worth visiting may be so no longer
+  static constexpr bool shrink = false;  // whether pairs on the stack may no longer be worth visiting
   bool overlap(const Node& a, const Node& b) const { return a.overlaps(b); }
-  bool within(const Node&) const { return true; }  // the same of one node
+  bool within(const Node&) const { return true; }  // the same for one node
 };
 
 // The same if boxes of some pairs of meshes have grown by more than their separation requires.
@@ -68,7 +68,7 @@ struct MotionBoxesLessExcess {
   bool within(const Node&) const { return true; }
 };
 
-// The same down to blocks alone, where the boxes of leaves wait in lanes.
+// The same down to blocks only, whose leaf boxes are compared in lanes.
 struct MotionBoxesOfBlocks : MotionBoxes {
   using Ends = AtBlocks;
 };
@@ -76,8 +76,8 @@ struct MotionBoxesOfBlocksLessExcess : MotionBoxesLessExcess {
   using Ends = AtBlocks;
 };
 
-// Whether features of two nodes, or of one, may have to be tested. Registers that a way through the rules needs would
-// cost every visit of those before it a third, so each is a function of its own.
+// Whether features of two nodes, or of one, may have to be tested. Separate functions: the registers for the path
+// through the rules would make every visit of the cases before it a third slower.
 template <class Boxes>
 [[gnu::always_inline]] inline bool boxes_meet(const Boxes& boxes, const Node& a, const Node& b) {
   return &a == &b ? boxes.within(a) : boxes.overlap(a, b);
@@ -103,12 +103,12 @@ bool worth_visiting(const std::vector<Node>& nodes, const PairRules& rules, cons
   return rules.all_meshes() ? boxes_meet(boxes, a, b) : worth_visiting_by_rules(rules, boxes, a, b);
 }
 
-// All of them worth visiting.
+// Divides the traversal into pairs that are all worth visiting.
 template <class Boxes>
 std::vector<NodePair> traversal_tasks(const Tree& tree, const PairRules& rules, const Boxes& boxes,
                                       std::size_t enough) {
   std::vector<NodePair> level, next;
-  // The root may be all there is: a mesh of one leaf, which the scene may forbid to touch itself.
+  // The root may be the whole tree: a mesh of one leaf, for which self-collision may be disabled.
   constexpr NodePair root{0, 0};
   constexpr typename Boxes::Ends ends;
   if (tree.nodes.empty() || !worth_visiting(tree.nodes, rules, boxes, root)) return level;

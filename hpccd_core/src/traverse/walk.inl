@@ -7,8 +7,8 @@ const Block& block_of(const Tree& tree, std::uint32_t node) {
   return tree.blocks[tree.block_of_leaf[tree.nodes[node].leaf]];
 }
 
-// Starts from pairs worth visiting. `between` is called between two pairs and may take from the stack; the walk ends if
-// it returns false.
+// Starts from pairs worth visiting. `between` is called between two pairs and may take pairs from the stack; the
+// traversal ends if it returns false.
 template <class Boxes, class Query, class Between>
 void walk(Boxes boxes, const Query& search, std::vector<NodePair>& stack, Worker& worker, Between&& between) {
   const Tree& tree = search.tree;
@@ -23,7 +23,7 @@ void walk(Boxes boxes, const Query& search, std::vector<NodePair>& stack, Worker
     else
       for (const LeafPair left : worker.sink->push(leaves)) search.test_leaves(left, worker);
   };
-  std::size_t stale = 0;  // number of pairs at the bottom that were pushed when boxes were larger
+  std::size_t stale = 0;  // pairs at the bottom that were pushed when boxes were larger
   while (!stack.empty()) {
     cancellation.heed();
     if (bounded && search.gave_up()) return stack.clear();
@@ -61,7 +61,7 @@ void walk(Boxes boxes, const Query& search, std::vector<NodePair>& stack, Worker
 
 Contact least(const std::vector<Contact>& found) { return *std::min_element(found.begin(), found.end(), before); }
 
-// Keeps one contact: vertex-face before edge-edge, and the first one in canonical order.
+// Keeps one contact: vertex-face before edge-edge, the first one in canonical order.
 void keep_least(Worker& worker) {
   if (!worker.vertex_face.empty())
     worker.vertex_face = {least(worker.vertex_face)}, worker.edge_edge.clear();
@@ -69,11 +69,11 @@ void keep_least(Worker& worker) {
     worker.edge_edge = {least(worker.edge_edge)};
 }
 
-// The task with the lowest number that has a contact decides, by the first batches of it that find one: each task is
-// walked separately, starting with empty batches. So the result does not depend on the threads.
+// The task with the lowest number that has a contact decides, by its first batches that find one. Each task is
+// traversed separately and starts with empty batches, so the result does not depend on the threads.
 template <class Boxes, class Query>
 void traverse_any(const Boxes& boxes, Query& search, ThreadPool& pool, std::vector<Worker>& workers) {
-  // Which contact is reported depends on the list, so it must not depend on the threads.
+  // The list of tasks affects which contact is reported, so it must not depend on the threads.
   constexpr std::size_t enough = 4096;
   const std::vector<NodePair> tasks = traversal_tasks(search.tree, search.rules, boxes, enough);
   std::atomic<std::size_t> next{0}, found{tasks.size()};
@@ -96,7 +96,7 @@ void traverse_any(const Boxes& boxes, Query& search, ThreadPool& pool, std::vect
       worker.best_task = task;
       for (std::size_t before = found.load(); task < before && !found.compare_exchange_weak(before, task);) {
       }
-      return;  // what it would take next comes later
+      return;  // any task it would take next comes later
     }
   });
   for (Worker& w : workers)
@@ -106,16 +106,17 @@ void traverse_any(const Boxes& boxes, Query& search, ThreadPool& pool, std::vect
 template <class Boxes, class Query>
 void traverse_all(const Boxes& boxes, Query& search, ThreadPool& pool, std::vector<Worker>& workers) {
   for (Worker& w : workers) w.begin(search);
-  // Enough for the threads to begin with; making 4096 instead took 0.9 of the 4.6 ms of a scene of 18 K triangles.
+  // Enough tasks for the threads to begin with; creating 4096 instead took 0.9 of the 4.6 ms of a scene of 18 K
+  // triangles.
   constexpr std::size_t enough = 64;
   std::vector<NodePair> tasks = traversal_tasks(search.tree, search.rules, boxes, enough);
-  if constexpr (Boxes::shrink) boxes.sort(tasks, 0);  // the last is taken first
+  if constexpr (Boxes::shrink) boxes.sort(tasks, 0);  // the last pair is processed first
   PairPool pairs(search.tree, tasks, pool.size());
   pool.share([&](int thread) {
     Worker& worker = workers[thread];
     BusyThread busy(pairs, thread);
     std::vector<NodePair> stack;
-    // What waits for a full batch is tested while there is nothing better to do; a sink's segments are for it to send.
+    // Incomplete batches are tested while the thread has nothing else to do; a sink sends its own segments.
     const auto meanwhile = [&] {
       if (!worker.sink) worker.flush();
     };

@@ -27,7 +27,7 @@ void Worker::begin(Search& search) {
   grows_batches_ = search.limits_fall || search.report == Report::any;
   growing_batch_ = first_batch;
   boxes_leave_much_ = false;
-  for (auto& w : waiting_)  // what an exception left behind
+  for (auto& w : waiting_)  // left behind by an exception
     if (w) w->edge_edge.n = w->vertex_face.n = 0;
   if (edge_faces_) edge_faces_->n = 0;
   if (!result_) result_ = std::make_unique<BatchResult>();
@@ -140,7 +140,7 @@ void Worker::resolve(const Candidate& candidate, Rule rule, double apart_until) 
   if (const auto value = search_->fallback[rule.number()](rule.accuracy, pair, count)) report(kind, {a, b, *value});
 }
 
-// With the time up to which pairs matter, and with the limit of each pair of the batch, where such are looked for.
+// With the time up to which pairs matter, and the limit of each pair of the batch, if the search uses them.
 const Geometry& Worker::geometry_of(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
                                     Kind kind) {
   const float until = search_->until();

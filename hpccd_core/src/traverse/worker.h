@@ -13,25 +13,26 @@
 
 namespace hpccd {
 
-// Takes pairs of leaves that somebody else shall test.
+// Takes pairs of leaves that are tested elsewhere.
 class PairSink {
  public:
   virtual ~PairSink() = default;
-  // Returns the pairs, of all that it was given, that the caller shall test itself; they stay until the next call.
+  // Returns the pairs, among all pushed ones, that the caller must test itself. They are valid until the next call.
   virtual std::span<const LeafPair> push(LeafPair pair) = 0;
-  virtual void flush() = 0;  // no more for now
+  virtual void flush() = 0;  // no more pairs for now
 };
 
-// Where contacts bound the search, any is better than none: the first batches are small.
+// If contacts bound the search, early ones matter most: the first batches are small.
 inline constexpr std::uint32_t first_batch = 64, first_batches = 32;
 
 // Aligned: counters of two threads on one cache line cost a fifth of a small scene's traversal.
 class alignas(128) Worker {
  public:
   void begin(Search& search);
-  // One of several tasks whose results do not depend on earlier ones: batches start empty, and are small at first.
+  // Begins one of several tasks whose results do not depend on earlier ones: batches start empty, and are small at
+  // first.
   void begin_task();
-  // Tests candidates by the rule, sooner or later: add(edge_edge, vertex_face) appends at most
+  // Tests candidates by the rule, now or later: add(edge_edge, vertex_face) appends at most
   // CandidateBuffer::most_per_call pairs to each.
   template <class Add>
   void test_candidates(Rule rule, Add&& add) {
@@ -41,26 +42,25 @@ class alignas(128) Worker {
     if (waiting.edge_edge.n >= full) drain(waiting.edge_edge, Kind::edge_edge, rule, full);
     if (waiting.vertex_face.n >= full) drain(waiting.vertex_face, Kind::vertex_face, rule, full);
   }
-  // The same of edges against faces: add(edge_face).
+  // The same for edge-face pairs: add(edge_face).
   template <class Add>
   void test_edge_faces(Add&& add) {
     if (!edge_faces_) edge_faces_ = std::make_unique<CandidateBuffer>();
     add(*edge_faces_);
     if (edge_faces_->n >= batch_capacity) drain(*edge_faces_, Kind::edge_face, {}, batch_capacity);
   }
-  // Tests pairs of one kind at once.
+  // Tests pairs of one kind immediately.
   void test_pairs(std::span<const std::uint32_t> first, std::span<const std::uint32_t> second, Kind kind, Rule rule);
   const Search& search() const { return *search_; }
-  // Whether boxes leave far more pairs of features to test than are near, because long features are slanted to every
-  // direction of the boxes. Then hulls of leaves are worth their cost.
+  // Whether boxes leave far more pairs of features than are near, because long features are slanted to all directions
+  // of the boxes. Then hulls of leaves are worth their cost.
   bool boxes_leave_much() const { return boxes_leave_much_; }
   bool has_found() const { return !vertex_face.empty() || !edge_edge.empty(); }
-  void flush();  // tests what waits
-  // The tier's fallback on a pair that nothing else decides, and a contact found elsewhere. apart_until: as in
-  // UndecidedPair.
+  void flush();  // tests incomplete batches
+  // Runs the tier's fallback on an undecided pair, and takes a contact found elsewhere. apart_until: see UndecidedPair.
   void resolve(const Candidate& candidate, Rule rule, double apart_until = 0);
   void report(Kind kind, const Contact& contact);
-  // Ends the work where that is requested: between any two pairs of nodes, batches and fallbacks.
+  // Throws if cancelled; called between any two pairs of nodes, batches and fallbacks.
   void heed_cancellation() const { search_->cancellation->heed(); }
   std::size_t bytes() const;
 
@@ -70,9 +70,9 @@ class alignas(128) Worker {
   std::uint64_t node_pairs = 0, leaf_pairs = 0;
   double elementary_seconds = 0;
   std::uint64_t elementary_ticks = 0;  // the same time, for the share of the k-DOP filter in it
-  SampledTime leaf_pairs_time;         // without the tests of what they found
-  PairSink* sink = nullptr;            // where pairs of leaves are left to somebody else
-  std::size_t best_task = 0;           // where report is any: the task these contacts come from
+  SampledTime leaf_pairs_time;         // without the tests of the candidates
+  PairSink* sink = nullptr;            // for pairs of leaves that are tested elsewhere
+  std::size_t best_task = 0;           // for report "any": the task of these contacts
 
  private:
   struct Waiting {
@@ -98,11 +98,11 @@ class alignas(128) Worker {
   std::unique_ptr<BatchResult> result_;
   std::uint32_t first_batches_ = 0;
   // For the search for any contact, which ends with the first batch that has one, and for nearest pairs: small if the
-  // last batch had a nearer pair, after which there is less to test.
+  // last batch had a nearer pair, after which fewer tests remain.
   bool grows_batches_ = false;
   std::uint32_t growing_batch_ = first_batch;
   bool nearer_ = false, boxes_leave_much_ = false;
-  std::vector<double> limits_;  // of the candidates of a batch, if they are not in a table
+  std::vector<double> limits_;  // of the candidates of a batch, unless they are in a table
 };
 
 }  // namespace hpccd

@@ -5,7 +5,7 @@
 
 namespace hpccd {
 
-// Of distance_batch.inl, compiled for each instruction set.
+// The functions of distance_batch.inl, compiled for each instruction set.
 HPCCD_IN_EACH_SET(BatchTest separation_batch(); BatchTest proximity_batch();)
 
 BatchTest separation_batch(Simd simd) { return HPCCD_OF_SET(simd, separation_batch)(); }

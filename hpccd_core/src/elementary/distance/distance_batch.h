@@ -9,7 +9,8 @@ namespace hpccd {
 // The earliest time at which features come within their separation (Geometry::separations), which is above 0.
 BatchTest separation_batch(Simd simd);
 
-// Of one snapshot, the vertices' t0: whether features are within the separation. In place of a time: their distance.
+// For one snapshot, the vertices' t0: whether features are within the separation. Returns their distance in place of a
+// time.
 BatchTest proximity_batch(Simd simd);
 
 }  // namespace hpccd

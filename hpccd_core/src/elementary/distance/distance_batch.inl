@@ -17,12 +17,12 @@ namespace {
 
 #include "elementary/distance/search_lanes.inl"
 
-// Of a pair, by its place in the batch and its vertices.
+// The separation of a pair, by its position in the batch and its vertices.
 HPCCD_HD double separation_at(const Geometry& g, std::uint32_t at, const std::uint32_t* v) {
   return g.separations.of_candidates ? g.separations.of_candidates[at] : g.separations.between(v[0], v[2]);
 }
 
-// of_lane(lane): of a lane's pair, where not all are the same.
+// Lanes filled by of_lane(lane), for separations that differ between pairs.
 template <class OfLane>
 HPCCD_HD Double separations(const Geometry& g, OfLane&& of_lane) {
   if (!g.separations.of_candidates && !g.separations.of_meshes) return Double(g.separations.uniform);

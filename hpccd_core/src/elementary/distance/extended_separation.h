@@ -8,8 +8,8 @@
 
 namespace hpccd {
 
-// No proof needs more of the places than that they are some of the features: doubles will do (a sixth of the time), if
-// they are not beyond the border by a rounding.
+// A proof needs only some points of the features: doubles suffice for them (a sixth of the time), if rounding does not
+// move them beyond the border.
 template <Kind kind>
 HPCCD_HD Nearest<DoubleDouble> nearest(const Snapshot<DoubleDouble>& s) {
   using R = DoubleDouble;
@@ -24,7 +24,7 @@ HPCCD_HD Nearest<DoubleDouble> nearest(const Snapshot<DoubleDouble>& s) {
 
 namespace extended_precision {
 
-// apart_until: up to this time a test before has shown the features to be farther apart than d.
+// apart_until: the time up to which a previous test has shown the features to be farther apart than d.
 template <Kind kind>
 HPCCD_HD Answer earliest_within(const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double d, double apart_until) {
   const DoubleDouble start(apart_until);
@@ -32,7 +32,7 @@ HPCCD_HD Answer earliest_within(const Vec3<double> q_t0[4], const Vec3<double> q
   return {o.contact, o.none, rounded_towards_zero(o.toc)};
 }
 
-// Where that is not known, it is asked again.
+// If that time is unknown, it is computed here.
 template <Kind kind>
 HPCCD_HD Answer earliest_within(const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double d) {
   const Motion<double> rounded = motion_by<kind, double>([&](int end, int to, int from) {

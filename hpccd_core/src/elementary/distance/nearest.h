@@ -20,17 +20,17 @@ HPCCD_HD Snapshot<R> snapshot_at(const Motion<R>& m, R t) {
 
 template <class R>
 struct Nearest {
-  R x, y;    // where the gap is smallest, as well as rounding allows: a place of the features, up to rounding
-  R square;  // of the gap there: no less than that of the features' distance
-  // In its direction, straightened: of a needle and of parallel edges it may be far too short.
+  R x, y;    // where the gap is smallest, up to rounding: a point of the features
+  R square;  // the gap there: not shorter than the distance of the features
+  // The gap with a corrected direction: for needles and parallel edges it may be far too short.
   Vec3<R> straight;
   R straight_square;
 };
 
 namespace detail {
 
-// A place of the features and what it may move along: the border over_a a + over_b b, nothing at a corner, or inside
-// both a and b.
+// A point of the features and the directions in which it may move: the border over_a a + over_b b, none at a corner, or
+// both a and b inside.
 template <class R>
 struct Place {
   R x, y, over_a, over_b;
@@ -49,7 +49,7 @@ HPCCD_HD R square_at(const Snapshot<R>& s, R x, R y) {
   return dot(gap, gap);
 }
 
-// A place on a border, from 0 to 1: the best, or the end that is nearest to it. Written so that NaN gives 0.
+// A position on a border, from 0 to 1: the best one, or the end nearest to it. Written so that NaN gives 0.
 template <class R>
 struct OnBorder {
   R at, moves;
@@ -69,8 +69,8 @@ HPCCD_HD void keep_nearer(Place<R>& best, const Place<R>& other, typename RealTr
           select(wins, other.square, best.square)};
 }
 
-// The best of the free minimum and of the best places of the borders: of those that rounding spoils (parallel edges,
-// needles) none is best.
+// The better of the free minimum and the best points of the borders. Points that rounding has spoiled (parallel edges,
+// needles) are never the best.
 template <Kind kind, class R>
 HPCCD_HD Place<R> best_place(const Snapshot<R>& s) {
   const R aa = dot(s.a, s.a), ab = dot(s.a, s.b), bb = dot(s.b, s.b), pa = dot(s.p, s.a), pb = dot(s.p, s.b);
@@ -101,8 +101,9 @@ HPCCD_HD Place<R> best_place(const Snapshot<R>& s) {
   }
 }
 
-// A short gap between long features is known to their rounding only, and its direction to that over its length. But it
-// stands on what its place may move along, which is known well: what it has along that is all rounding.
+// A short gap between long features is known to their rounding errors only, and its direction to these divided by its
+// length. But the gap is perpendicular to the directions in which its point may move, which are accurate: its component
+// along them is rounding error.
 template <class R>
 HPCCD_HD Nearest<R> straightened(const Place<R>& best, const Snapshot<R>& s) {
   const Vec3<R> given = gap_at(s, best.x, best.y), n = cross(s.a, s.b);

@@ -10,12 +10,12 @@ namespace hpccd {
 template <class R>
 struct NearOrFar {
   using Mask = typename RealTraits<R>::Mask;
-  Mask near, far;  // neither: undecided, or the distance is not known well enough
+  Mask near, far;  // neither: undecided, or the distance is not accurate enough
   R distance;
 };
 
 // Relative to the size of the pair: the contract promises 1e-12 of the scene's, whose largest coordinate may be a sixth
-// of it. Below it features may touch, which is for integers to say.
+// of it. Below this distance features may touch, which integers decide.
 inline constexpr double distance_radius = 1.5e-13;
 
 template <Kind kind, class R>

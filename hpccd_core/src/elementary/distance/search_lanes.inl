@@ -3,7 +3,7 @@
 // average for a ball that spins under a cloth), and the slowest of eight 11.2. When few pairs of a group are still
 // running, they are set aside and later continued together with those of other groups. Part of distance_batch.inl.
 
-// SeparationsOf: of lanes by their numbers in the list.
+// SeparationsOf: separations of lanes by their numbers in the list.
 template <Kind kind, class SeparationsOf>
 class SearchLanes {
  public:
@@ -11,7 +11,7 @@ class SearchLanes {
                        BatchResult& result)
       : g_(g), list_(list), separations_of_(separations_of), result_(result) {}
 
-  // Of the lanes that count, from a look on before which they are farther apart than d.
+  // Starts the searches of the valid lanes from a state before which the features are farther apart than d.
   template <class Numbers>
   HPCCD_HD void begin(const Motion<Double>& m, Double d, const Look<kind, Double>& start,
                       const LaneNumbers<Numbers>& of) {
@@ -26,10 +26,10 @@ class SearchLanes {
 
  private:
   static constexpr std::uint32_t width = double_width;
-  // Taken up again, a search costs as much as two steps.
+  // Resuming a search costs as much as two steps.
   static constexpr int few = width < 4 ? 0 : width / 2;
 
-  // The last n of those left.
+  // Resumes the last n of the searches that were set aside.
   HPCCD_HD void go_on(std::uint32_t n, int keep) {
     n_ -= n;
     Chosen of;
@@ -50,7 +50,7 @@ class SearchLanes {
     run(m, SeparationSearch<kind, Double>(m, separations_of_(numbers), state), numbers, taken, keep);
   }
 
-  // Until no more than `keep` run, which are left. The others are answered, or undecided.
+  // Runs until at most `keep` searches are left, which are set aside. The others are decided or undecided.
   template <class Numbers>
   HPCCD_HD void run(const Motion<Double>& m, SeparationSearch<kind, Double> search, const LaneNumbers<Numbers>& of,
                     const std::uint32_t* taken, int keep) {
@@ -92,7 +92,7 @@ class SearchLanes {
   const PairList& list_;
   const SeparationsOf& separations_of_;
   BatchResult& result_;
-  std::uint32_t n_ = 0;  // left
+  std::uint32_t n_ = 0;  // set aside
   std::uint32_t number_[2 * width], taken_[2 * width];
   double values_[n_values][2 * width];
 };

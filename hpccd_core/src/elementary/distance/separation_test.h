@@ -18,10 +18,10 @@ template <Kind kind, class R>
 struct Look {
   R t;
   Snapshot<R> at;
-  Vec3<R> direction;                   // of the gap, of length one
-  R length, slope;                     // of the gap, as far as it is known, and how fast it changes
-  R square;                            // between two points of the features
-  typename RealTraits<R>::Mask known;  // the direction is
+  Vec3<R> direction;                   // unit direction of the gap
+  R length, slope;                     // lower bound on the gap, and its rate of change
+  R square;                            // distance between two points of the features
+  typename RealTraits<R>::Mask known;  // whether the direction is reliable
 };
 
 template <Kind kind, class R>
@@ -62,13 +62,12 @@ HPCCD_HD Look<kind, R> select(typename RealTraits<R>::Mask m, const Look<kind, R
           (m && a.known) || (!m && b.known)};
 }
 
-// A contact is accepted where its time is known to this: the contract promises 1e-12.
+// A contact is accepted if its time is known to this accuracy: the contract promises 1e-12.
 inline constexpr double separation_toc_radius = 8e-13;
 
 // With a gap of at most d between the features, p . n for n = a x b is at most d |n|. So where the cubic stays beyond d
-// times the largest |n| of the step, which is one of its Bernstein coefficients' (they bound it as they bound the
-// cubic), so do the features. The roundings of n, 20 u |a||b| a coordinate, count as much as those of the cubic at
-// most.
+// times the largest |n| of the step, the features stay apart; the largest |n| is bounded by its Bernstein coefficients,
+// like the cubic. The rounding errors of n, 20 u |a||b| per coordinate, are at most as large as those of the cubic.
 template <class R>
 HPCCD_HD typename RealTraits<R>::Mask planes_stay_apart(const Motion<R>& m, R d) {
   const Magnitudes<R> size = magnitudes(m);
@@ -79,7 +78,7 @@ HPCCD_HD typename RealTraits<R>::Mask planes_stay_apart(const Motion<R>& m, R d)
   return in_range(size) && certainly_no_root(coplanarity(m), coplanarity_error(size).coefficient + slack);
 }
 
-// What two looks at the ends of the step tell: already within d, or kept apart by their directions.
+// Decides by the states at the ends of the step: already within d, or kept apart by their directions.
 template <Kind kind, class R>
 HPCCD_HD Outcome<R> decided_by_ends(const Motion<R>& m, R d, const Look<kind, R>& start, const Look<kind, R>& end) {
   const R s = extent(magnitudes(m));
@@ -94,25 +93,26 @@ HPCCD_HD Outcome<R> separation_filter(const Motion<R>& m, R d) {
   return decided_by_ends(m, d, look<kind>(m, s, R(0)), look<kind>(m, s, R(1)));
 }
 
-// When the gap would be `aim` long if it went on to change as it does; the end of the step where it does not shrink.
+// The time at which the gap would be `aim` long if it continued to change at its rate; the end of the step if it does
+// not shrink.
 template <Kind kind, class R>
 HPCCD_HD R newton(const Look<kind, R>& at, R aim) {
   return select(at.slope < R(0), at.t + (at.length - aim) / (R(0) - at.slope), R(1));
 }
 
-// What the search for the earliest time has come to, beside what the pair itself says: it can be left after any step
-// and taken up again.
+// The state of the search for the earliest time, without the data of the pair: the search can be suspended after any
+// step and resumed.
 template <class R>
 struct SearchState {
-  R from;                  // certainly farther apart than d up to here
-  R high, length_at_high;  // certainly within d here, once that is found
-  R reach;                 // so far ahead trials have succeeded lately
-  R guess;                 // by the last look that told anything, on whichever side of the answer
-  R slow;                  // trials in a row that were too late and not much earlier than the one before
-  R trial;                 // the next one
+  R from;                  // certainly farther apart than d up to this time
+  R high, length_at_high;  // certainly within d at this time, once it is found
+  R reach;                 // step width at which trials have succeeded recently
+  R guess;                 // from the last informative trial, on either side of the result
+  R slow;                  // consecutive trials that were too late and not much earlier than the previous one
+  R trial;                 // the next trial
 };
 
-// A near miss by a relative 1e-15 takes 25 steps to pass.
+// Passing a near miss by a relative 1e-15 takes 25 steps.
 inline constexpr int most_search_steps = 60;
 
 // For the time up to which the features of a motion are certainly farther apart than d.
@@ -121,7 +121,7 @@ class SeparationSearch {
  public:
   using Mask = typename RealTraits<R>::Mask;
 
-  // From a look on before which they are.
+  // Starts from a state before which they are.
   HPCCD_HD SeparationSearch(const Motion<R>& m, R d, const Look<kind, R>& start) : SeparationSearch(m, d) {
     from_ = start;
     const Mask usable = squares_in_range(s_);
@@ -131,7 +131,7 @@ class SeparationSearch {
     state_.guess = newton(start, aim_);
     state_.trial = lesser(greater(state_.guess, start.t + R(0.5) * radius()), R(1));
   }
-  // Goes on from a state in which it was running.
+  // Resumes a search from its state.
   HPCCD_HD SeparationSearch(const Motion<R>& m, R d, const SearchState<R>& left) : SeparationSearch(m, d) {
     state_ = left;
     from_ = look<kind>(m, s_, left.from);
@@ -145,7 +145,7 @@ class SeparationSearch {
     left.from = from_.t;
     return left;
   }
-  // Undecided while it runs, and where it ended without an answer; toc is then the latest time known to be free.
+  // Undecided while the search runs, and if it ended without a result; toc is then the latest time known to be free.
   HPCCD_HD Outcome<R> outcome() const { return {contact_, none_, from_.t, R(0)}; }
 
   HPCCD_HD void step(const Motion<R>& m) {
@@ -161,7 +161,7 @@ class SeparationSearch {
     state_.guess = select(blocked, state_.guess, newton(to, aim_));
     none_ = none_ || (free && state_.trial >= R(1));
     contact_ = contact_ || (running_ && state_.high - from_.t <= radius());
-    // The limits are farther apart than what happens in that time.
+    // The two limits are farther apart than the features move in that time.
     const Mask hidden = free && from_.length < aim_ + margin_.above - margin_.below &&
                         (R(0) - from_.slope) * radius() < margin_.above - margin_.below;
     running_ = running_ && !none_ && !contact_ && !hidden && !(blocked && ahead <= R(0.25) * radius());
@@ -182,7 +182,7 @@ class SeparationSearch {
  private:
   HPCCD_HD SeparationSearch(const Motion<R>& m, R d)
       : s_(extent(magnitudes(m))), margin_(margins(d, s_)), none_(R(1) < R(0)) {
-    // Between these two distances rounding hides the answer; trials aim as far before it.
+    // Between these two distances rounding hides the result; trials aim as far before it.
     aim_ = margin_.above + (margin_.above - margin_.below);
   }
   HPCCD_HD static R radius() { return R(separation_toc_radius); }
@@ -191,10 +191,11 @@ class SeparationSearch {
   Margins<R> margin_;
   Look<kind, R> from_;
   Mask contact_, running_, none_;
-  SearchState<R> state_;  // but for `from`, which is that of from_
+  SearchState<R> state_;  // all except `from`, which is that of from_
 };
 
-// From a time on up to which the features are certainly farther apart than d. Undecided, toc is the latest such time.
+// Starts from a time up to which the features are certainly farther apart than d. Undecided: toc is the latest such
+// time.
 template <Kind kind, class R>
 HPCCD_HD Outcome<R> separation_test(const Motion<R>& m, R d, R start = R(0)) {
   SeparationSearch<kind, R> search(m, d, look<kind>(m, extent(magnitudes(m)), start));

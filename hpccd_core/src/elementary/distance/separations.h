@@ -10,16 +10,16 @@
 namespace hpccd {
 
 struct Separations {
-  double uniform = 0;  // where there is neither table nor list
+  double uniform = 0;  // if there is neither table nor list
   const double* of_meshes = nullptr;
   const std::uint32_t* mesh_of_vertex = nullptr;
   std::uint32_t n_meshes = 0;
-  const double* of_candidates = nullptr;  // of a batch
+  const double* of_candidates = nullptr;  // for a batch
   // For many meshes, in place of the table: a batch passes the separations of its candidates. Looking them up in the
-  // code of the lanes would cost every batch of distances a tenth.
+  // code of the lanes would slow down every batch of distances by a tenth.
   PairValues<double> of_pairs = {};
 
-  // Of two features by one vertex of each.
+  // The separation of two features, by one vertex of each.
   HPCCD_HD double between(std::uint32_t first, std::uint32_t second) const {
     return of_meshes ? of_meshes[mesh_of_vertex[first] * n_meshes + mesh_of_vertex[second]] : uniform;
   }
