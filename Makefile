@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# All that is made lies inside this folder: .venv/ (Python environment), build/ (compiler output), and what demo writes.
+# All output is inside this folder: .venv/ (Python environment), build/ (compiler output), and the files of the demo.
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DELETE_ON_ERROR:
@@ -11,8 +11,8 @@ VENV        ?= .venv
 JOBS        ?= $(shell nproc)
 EXTRAS      ?= test lint interop
 PYTEST_ARGS ?=
-# Half of the Python tests' time is spent waiting for timers and messages: one more than there are cores. Bounded, as each
-# starts nodes of its own.
+# Python tests wait for timers and messages half of the time, so one more than there are cores. At most 8, because each
+# starts its own nodes.
 TEST_JOBS   ?= $(shell echo $$(($(JOBS) < 8 ? $(JOBS) + 1 : 8)))
 AARCH64_TESTS ?= *
 DEMO_ARGS   ?=
@@ -23,84 +23,84 @@ BENCH_ARGS  ?= --help
 BIN := $(VENV)/bin
 export PATH := $(abspath $(BIN)):$(PATH)
 export CMAKE_BUILD_PARALLEL_LEVEL := $(JOBS)
-# Where CMake builds what is installed, the C++ tests and the C++ package: one tree for each environment.
+# Build tree of the package, the C++ tests and the C++ library: one for each environment.
 TREE := build/cmake$(if $(filter-out .venv,$(VENV)),-$(notdir $(VENV)))
 export HPCCD_BUILD_TREE := $(abspath $(TREE))
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
-# The wheels' bootstrapper marks its environment: the mark of another environment must not reach this one.
+# The bootstrapper of the ROS wheels marks its environment; unset the mark of another one.
 unexport PYTHONPATH PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
-# A ROS installation sourced in this shell must not mix with the wheels, which hold one RMW implementation only.
+# A ROS installation sourced in this shell must not mix with the wheels, which contain one RMW implementation only.
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH RMW_IMPLEMENTATION
 ifdef ROS_DISTRO
 unexport LD_LIBRARY_PATH
 endif
 
-# Stamps. PYTHON or EXTRAS named on the command line have one of their own, so that naming others is noticed.
+# Stamps. PYTHON or EXTRAS from the command line have their own, so that a change of them is noticed.
 space := $(subst ,, )
 ENVIRONMENT := $(VENV)/.hpccd-environment$(if $(PYTHON),-$(subst /,-,$(PYTHON)))$(if \
   $(filter-out file,$(origin EXTRAS)),-$(subst $(space),+,$(EXTRAS)))
 INSTALLED   := $(VENV)/.hpccd-installed
 
-# What the installed package is made of.
+# Sources of the installed package.
 SOURCES := $(sort $(shell find CMakeLists.txt setup.py package.xml action cmake config launch msg srv scripts hpccd_ros hpccd_core \
   \( -name __pycache__ -o -name dist -o -path hpccd_core/tests \) -prune -o -type f -print))
 
 .PHONY: help venv demo bench test test-core test-python test-long test-gpu test-aarch64 sanitize fuzz oracle docs lint format release-check pin clean distclean \
   FORCE
 
-help: ## Show this list
+help: ## Show this list of targets
 	@echo "hpccd: continuous collision detection of deforming triangle meshes, as a ROS 2 node."
 	@echo "New here? make demo"
 	@echo
-	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo
 	@echo "Variables, e.g. make test PYTEST_ARGS='-k replay':"
-	@echo "  PYTHON=python3.12   which Python for .venv: 3.11 or 3.12 (default: the first found)"
-	@echo "  VENV=.venv          where the environment lies"
+	@echo "  PYTHON=python3.12   Python of .venv: 3.11 or 3.12 (default: the first found)"
+	@echo "  VENV=.venv          folder of the environment"
 	@echo "  JOBS=4              compile jobs (default: all cores)"
-	@echo "  HPCCD_CUDA=ON       compile the GPU backends (default: where there is an NVIDIA GPU); OFF: do not"
-	@echo "  CMAKE_ARGS=...      passed on to CMake"
-	@echo "  TEST_JOBS=1         Python tests at a time (default: one more than JOBS, at most 8)"
-	@echo "  PYTEST_ARGS=...     passed on to pytest      DEMO_ARGS=...  passed on to hpccd demo"
-	@echo "  AARCH64_TESTS='GoldenHashes.*'   which tests test-aarch64 runs (default: all of the core)"
-	@echo "  HPCCD_DATA=folder   scenes with ground truth; without it the tests that need them are skipped"
+	@echo "  HPCCD_CUDA=ON       compile the GPU backends (default: if there is an NVIDIA GPU); OFF: do not"
+	@echo "  CMAKE_ARGS=...      arguments for CMake"
+	@echo "  TEST_JOBS=1         parallel Python tests (default: one more than JOBS, at most 8)"
+	@echo "  PYTEST_ARGS=...     arguments for pytest     DEMO_ARGS=...  arguments for hpccd demo"
+	@echo "  AARCH64_TESTS='GoldenHashes.*'   tests of test-aarch64 (default: all)"
+	@echo "  HPCCD_DATA=folder   scenes with ground truth (default: tests that need them are skipped)"
 
-venv: $(INSTALLED) ## Create .venv, build and install the package (again, where sources have changed)
+venv: $(INSTALLED) ## Create .venv, build and install the package; run again after a change
 
-demo: venv ## Node, publisher and recorder as processes over DDS; leaves a recording and a picture
+demo: venv ## Run node, publisher and recorder over DDS; write a recording and a picture
 	@$(BIN)/hpccd demo $(DEMO_ARGS)
 
-test: test-core test-python ## Pass all tests
+test: test-core test-python ## Run all tests
 
-test-core: $(if $(wildcard $(TREE)/build.ninja),$(ENVIRONMENT),venv) ## Only the C++ tests of the core
+test-core: $(if $(wildcard $(TREE)/build.ninja),$(ENVIRONMENT),venv) ## Run the C++ tests
 	@. $(VENV)/build.env; flock $(VENV) cmake --build $(TREE) --target hpccd_core_tests
 	@CUDA_VISIBLE_DEVICES= ctest --test-dir $(TREE)/hpccd_core --output-on-failure --no-tests=error --parallel $(JOBS)
 
-test-python: venv oracle ## Only the Python tests: core against oracles, node over DDS, recordings
+test-python: venv oracle ## Run the Python tests: core against oracles, node over DDS, recordings
 	$(BIN)/pytest --numprocesses $(TEST_JOBS) --dist worksteal $(PYTEST_ARGS)
 
-test-long: venv oracle ## Only the Python tests that take minutes, which make test skips
+test-long: venv oracle ## Run the Python tests that take minutes, which make test skips
 	$(BIN)/pytest --long -m long --numprocesses $(TEST_JOBS) $(PYTEST_ARGS)
 
-test-gpu: venv oracle ## Only the tests of the GPU backends, on a machine with an NVIDIA GPU
+test-gpu: venv oracle ## Run the tests of the GPU backends, on a machine with an NVIDIA GPU
 	@$(BIN)/python -c 'import sys, hpccd_core as hc; "gpu" in hc.backends() or sys.exit(sys.argv[1])' \
 	  "hpccd: no GPU backend here (see hpccd info). Without a CUDA toolkit: make venv EXTRAS='test cuda'"
 	$(BIN)/pytest test/gpu $(PYTEST_ARGS)
 
-test-aarch64: $(ENVIRONMENT) ## The C++ tests compiled for aarch64, in an emulator (g++-aarch64-linux-gnu, qemu-user)
+test-aarch64: $(ENVIRONMENT) ## Run the C++ tests for aarch64 in an emulator (g++-aarch64-linux-gnu, qemu-user)
 	@bash scripts/test_aarch64.sh $(VENV) '$(AARCH64_TESTS)'
 
-sanitize: $(ENVIRONMENT) ## C++ tests under AddressSanitizer + UndefinedBehaviorSanitizer, then ThreadSanitizer
+sanitize: $(ENVIRONMENT) ## Run the C++ tests under AddressSanitizer and UBSan, then ThreadSanitizer
 	@$(call run_core_tests,build/core-asan,-DCMAKE_BUILD_TYPE=RelWithDebInfo -DHPCCD_SANITIZE=address$(comma)undefined)
 	@$(call run_core_tests,build/core-tsan,-DCMAKE_BUILD_TYPE=RelWithDebInfo -DHPCCD_SANITIZE=thread)
 
-bench: venv oracle ## Measure one subject (BENCH_ARGS="scaling"; without it, a list of them)
+bench: venv oracle ## Run one benchmark (BENCH_ARGS="scaling"; by default, list them)
 	PYTHONPATH=test $(BIN)/python -m bench $(BENCH_ARGS)
 
 fuzz: venv oracle ## Compare the core with the exact oracle on random and degenerate queries (FUZZ_ARGS=--help)
 	PYTHONPATH=test:build/oracle $(BIN)/python -m fuzz $(FUZZ_ARGS)
 
-docs: $(INSTALLED) $(VENV)/.hpccd-docs ## Build the site of the documentation in build/site
+docs: $(INSTALLED) $(VENV)/.hpccd-docs ## Build the documentation as a site in build/site
 	$(BIN)/sphinx-build --fail-on-warning --keep-going --quiet --jobs $(JOBS) docs build/site
 	@echo "hpccd: open build/site/index.html"
 
@@ -109,7 +109,7 @@ $(VENV)/.hpccd-docs: $(ENVIRONMENT)
 	@bash scripts/create_venv.sh $(VENV) $(EXTRAS) docs
 	@touch $@
 
-oracle: $(ENVIRONMENT) ## Build the exact oracle that tests and fuzzer compare with
+oracle: $(ENVIRONMENT) ## Build the exact oracles for tests and fuzzer
 	@mkdir -p build; . $(VENV)/build.env; { cmake -S test/oracle -B build/oracle -G Ninja \
 	  -DPython_EXECUTABLE="$(abspath $(BIN))/python" && cmake --build build/oracle; } > build/oracle.log 2>&1 || { cat build/oracle.log; exit 1; }
 
@@ -128,10 +128,10 @@ format: $(ENVIRONMENT) ## Fix the style where a tool can
 	$(BIN)/ruff format .
 	@git ls-files -z '*.h' '*.cpp' '*.inl' '*.cu' '*.cuh' | xargs -0r $(BIN)/clang-format -i
 
-release-check: $(ENVIRONMENT) ## What must be settled before a release: placeholders, dates, versions
+release-check: $(ENVIRONMENT) ## List what a release still needs: addresses, dates, versions
 	@$(BIN)/python scripts/release_check.py
 
-pin: $(ENVIRONMENT) ## Write the versions now in .venv to requirements/
+pin: $(ENVIRONMENT) ## Write the versions installed in .venv to requirements/
 	@version=$$($(BIN)/python -c 'import sys; print("%d.%d" % sys.version_info[:2])'); \
 	  $(BIN)/python scripts/pin.py > requirements/constraints-$$version.txt
 
@@ -143,13 +143,13 @@ distclean: clean ## Remove .venv too
 	rm -rf $(VENV)
 
 comma := ,
-# Undefined behaviour is reported and passed over unless told otherwise.
+# By default UBSan reports undefined behaviour and continues.
 export UBSAN_OPTIONS := halt_on_error=1:print_stacktrace=1
 
-# GoogleTest comes as source in a wheel, so that the tests need no system package and are the same everywhere.
+# GoogleTest is source code in a wheel, so the tests need no system package and use the same version everywhere.
 GTEST := -DHPCCD_BUILD_TESTS=ON -DGTest_DIR=$(CURDIR)/cmake/gtest -DHPCCD_GTEST_SOURCE=$(abspath $(VENV))/src/gtest_vendor
 
-# Tests whose compiler flags are not those of the package: in a build tree of their own.
+# Tests with other compiler flags than the package, in a separate build tree.
 define run_core_tests
 mkdir -p build; . $(VENV)/build.env; \
 cmake -S hpccd_core -B $(1) -G Ninja $(GTEST) -DHPCCD_CUDA=OFF \
@@ -169,7 +169,7 @@ $(INSTALLED): $(ENVIRONMENT) $(SOURCES) build/sources.txt
 	@cat $(TREE)/hpccd_core/cuda.txt
 	@touch $@
 
-# Changes when a source file appears or disappears, which no time stamp of another file shows, or when CMake's options do.
+# Changes when a source file is added or removed, or when options of CMake change.
 build/sources.txt: FORCE
 	@mkdir -p $(@D)
 	@printf '%s\n' '$(HPCCD_CUDA) $(CMAKE_ARGS)' $(SOURCES) | cmp -s - $@ || \

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# Only for ROS 2 that was installed as Python wheels; hand it over as -DCMAKE_PROJECT_INCLUDE.
-# HPCCD_ROS_PREFIX: the environment that holds them, also for a later run of CMake by Ninja; else AMENT_PREFIX_PATH and
-# CMAKE_PREFIX_PATH name it.
+# For ROS 2 installed as Python wheels only; pass it as -DCMAKE_PROJECT_INCLUDE.
+# HPCCD_ROS_PREFIX: the environment with the wheels, also for a later run of CMake by Ninja; by default from
+# AMENT_PREFIX_PATH and CMAKE_PREFIX_PATH.
 if(HPCCD_ROS_PREFIX)
   set(ENV{AMENT_PREFIX_PATH} "${HPCCD_ROS_PREFIX}")
   set(ENV{CMAKE_PREFIX_PATH} "${HPCCD_ROS_PREFIX}")
@@ -30,7 +30,7 @@ function(_hpccd_drop_missing_include_folders)
 endfunction()
 
 # With the environment inside the source folder (.venv), CMake refuses to export a target whose include folder lies
-# in there. Nobody compiles against the exported target of a wheel: keep such folders for this build only.
+# in there. The exported target of a wheel is not used for compiling: keep such folders for this build only.
 function(_hpccd_keep_own_environment_to_this_build)
   set(target ${PROJECT_NAME}__rosidl_generator_py)
   if(NOT TARGET ${target})

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that the includes of the C++ core run one way: each folder includes only itself and those before it.
+"""Check that the includes of the C++ core run one way: each folder includes only itself and folders before it.
 
 usage: check_includes.py [FOLDER]    (default: hpccd_core/src)
 
-Prints each include that runs up as file:line, with the arrow and the order, and exits 1 where there is one.
+Prints each violation as file:line, with the order, and exits 1 if there is one.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import re
 import sys
 from pathlib import Path
 
-# Data goes this way. What stands beside the folders (detector.cpp, bindings.cpp) comes last.
+# The direction of the data. Files outside the folders (detector.cpp, bindings.cpp) come last.
 FOLDERS = ["base", "rigid", "scene", "bvh", "elementary", "traverse", "contacts", "paper", "gpu", "hybrid", "backends"]
 TOP = "the files beside the folders"
 ORDER = [*FOLDERS, TOP]
@@ -28,7 +28,7 @@ def folder_of(path: Path) -> str:
 
 
 def problems(source: Path) -> list[str]:
-    """Every include below `source` that runs up, and every folder that has no place in the order."""
+    """Every include below `source` against the order, and every folder that the order lacks."""
     found = []
     for file in sorted(f for f in source.rglob("*") if f.suffix in SUFFIXES):
         folder = folder_of(file.relative_to(source))

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# colcon_check.sh FOLDER: builds and tests what is committed with colcon, on the ROS wheels, in a clean workspace in
-# FOLDER, which must lie outside the checkout and is made anew. Takes 25 minutes on two cores.
-# PYTHON in the environment: which one, 3.11 or 3.12. COLCON_TEST=no: build only.
+# colcon_check.sh FOLDER: builds and tests the last commit with colcon, on the ROS wheels, in a clean workspace. FOLDER
+# must be outside the checkout and is replaced. Takes 25 minutes on two cores.
+# Environment: PYTHON selects 3.11 or 3.12; COLCON_TEST=no builds only.
 set -euo pipefail
 
 here=$(cd "$(dirname "$0")/.." && pwd)
@@ -22,9 +22,9 @@ touch "$workspace/.colcon-check"
 # Nothing of another ROS or of the checkout's own environment.
 unset PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH ROS_DISTRO
 git clone --quiet "$here" "$workspace/src/hpccd"
-# In a workspace of its own it would be found; inside of another package colcon does not look for one.
+# colcon does not look for packages inside another package.
 cp -r "$workspace/src/hpccd/examples/cpp" "$workspace/src/falling_sheet"
-# From a workspace one asks for the package; what ROS exports with it wants C as well.
+# In a workspace the package is named hpccd; the targets that ROS exports with it also need C.
 sed -i "s/find_package(hpccd_core [0-9.]* REQUIRED).*/find_package(hpccd REQUIRED)/; s/LANGUAGES CXX/LANGUAGES C CXX/" \
   "$workspace/src/falling_sheet/CMakeLists.txt"
 venv=$workspace/venv

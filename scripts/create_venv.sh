@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# create_venv.sh FOLDER EXTRA...: a virtual environment with all that building, running and testing needs.
-# PYTHON in the environment: which Python; empty: that of FOLDER if it exists, else the first suitable one.
+# create_venv.sh FOLDER EXTRA...: creates a virtual environment for building, running and testing.
+# Environment: PYTHON selects the Python; by default that of FOLDER if it exists, else the first suitable one.
 set -euo pipefail
 
 venv=$1
@@ -73,7 +73,7 @@ else
   "$python" -m venv --clear "$venv"
 fi
 
-# Debian and Ubuntu keep Python.h in a package of its own; without root it can still be unpacked in here.
+# Debian and Ubuntu have Python.h in a separate package; without root it can be unpacked here.
 # build.env is read by the Makefile before anything is compiled.
 : >"$venv/build.env"
 if ! has_headers; then

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Print the exact versions installed in this environment as a pip constraints file.
 
-Reads *.dist-info only: the ROS wheels also carry stray *.egg-info folders, and `pip freeze` turns those into
-project names that do not exist on the package index.
+Reads *.dist-info only: the ROS wheels also contain *.egg-info folders, and `pip freeze` lists those under names that do
+not exist on the package index.
 """
 
 import platform

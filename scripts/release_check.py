@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""release_check.py [FOLDER]: what in a checkout must be settled before a release, each with its place and remedy.
+"""release_check.py [FOLDER]: list what a checkout lacks for a release, each with its place and remedy.
 
-Exit status 0: nothing. 1: something, all of it printed. Reads files only; needs Python 3.11 and PyYAML.
+Exit status 0: nothing is missing; 1: something is. Reads files only; needs Python 3.11 and PyYAML.
 """
 
 import argparse
@@ -14,7 +14,7 @@ from pathlib import Path
 
 import yaml
 
-# Addresses in domains of RFC 2606, behind which nobody can stand, and words that say that something is to come.
+# Addresses in domains that RFC 2606 reserves, and words that mark something as missing.
 NOBODY = re.compile(
     r"(?:[\w.+-]+@|https?://)(?:[\w-]+\.)*(?:example\.(?:com|net|org)|(?:invalid|test|example|localhost)\b)",
     re.IGNORECASE,
@@ -22,7 +22,7 @@ NOBODY = re.compile(
 PLACEHOLDER = re.compile(r"\b(?:placeholder|not settled|are settled)\b", re.IGNORECASE)
 URL_KINDS = ("website", "repository", "bugtracker")
 PACKAGES = ("package.xml", "examples/cpp/package.xml")
-# Files that tell users whom to turn to.
+# Files with addresses for users.
 FOR_PEOPLE = (
     *PACKAGES,
     "CITATION.cff",
@@ -38,7 +38,7 @@ FOR_PEOPLE = (
 
 
 def findings(root: Path) -> Iterator[str]:
-    """PLACE: what stands there; remedy."""
+    """PLACE: problem; remedy."""
     yield from placeholders(root)
     yield from missing_addresses(root)
     yield from open_dates(root)
@@ -97,7 +97,7 @@ def versions(root: Path) -> Iterator[str]:
 
 
 def topmost_heading(root: Path) -> tuple[int, str, str]:
-    """(line, version, date or what stands in its place)"""
+    """(line, version, date or the text in its place)"""
     for number, line in enumerate((root / "CHANGELOG.rst").read_text().splitlines(), start=1):
         if found := re.fullmatch(r"(\d+\.\d+\.\d+) \((.+)\)", line):
             return number, found[1], found[2]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Print what pyproject.toml requires to build and run the package, and the extras named as arguments.
 
-For an environment that holds the build requirements too, so that building needs no isolation: 5 s, not 40 s.
+The environment then contains the build requirements too, so a build needs no isolation: 5 s instead of 40 s.
 """
 
 import sys

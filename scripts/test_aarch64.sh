@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# test_aarch64.sh VENV FILTER: C++ tests of the core, compiled for aarch64 and run in an emulator, whose speed says
-# nothing. FILTER: which, as GoogleTest writes it; of golden hashes only, nothing else is compiled.
-# test_aarch64.sh --check: only whether this machine can.
+# test_aarch64.sh VENV FILTER: compiles the C++ tests of the core for aarch64 and runs them in an emulator. FILTER: a
+# GoogleTest filter; for golden hashes only, nothing else is compiled.
+# test_aarch64.sh --check: checks whether this machine has compiler and emulator.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

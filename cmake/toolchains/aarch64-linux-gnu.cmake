@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Compiles for aarch64 with Debian's cross compiler (g++-aarch64-linux-gnu); what is compiled runs in an emulator
-# (qemu-user). Python, of which only the path to the Boost headers is asked, is this machine's own.
+# Compiles for aarch64 with Debian's cross compiler (g++-aarch64-linux-gnu); programs run in an emulator (qemu-user).
+# Python is that of this machine: it only provides the path to the Boost headers.
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_SYSTEM_PROCESSOR aarch64)
 set(CMAKE_C_COMPILER aarch64-linux-gnu-gcc)

@@ -5,8 +5,8 @@
   python -m bench <subject> --help          scenes, options and examples of one subject
 
 Most subjects take generated scenes (`hpccd scene --list`), the files of the folder HPCCD_DATA, or any recording of
-`hpccd record`; --help of a subject says which. Variants run in turn on the same steps; close other programs first: the
-result says how busy they were.
+`hpccd record`; --help of a subject says which. Variants alternate on the same steps. Close other programs first; the
+result includes the load of the machine.
 """
 
 import argparse
@@ -18,29 +18,29 @@ from pathlib import Path
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command
 
-# Each is a module of this package; what it measures.
+# Module of this package -> what it measures.
 SUBJECTS = {
-    "peer": "all and first contacts beside ipctk",
+    "peer": "all and first contacts, compared with ipctk",
     "scaling": "speed-up over one thread against threads (Fig. 6 and 7), for each method",
     "methods": "the methods and instruction sets compared: time, and equality of the results",
     "size": "how time and memory grow with the number of triangles",
     "memory": "peak memory and bytes per triangle",
-    "worlds": "many worlds in one call on CPUs, beside detectors that are asked one world at a time",
-    "ropes": "ropes as edges, beside thin triangles and beside cloth with as many edges",
-    "options": "the time that each way to model less saves",
-    "distance": "separation, proximity, intersections, smallest distances beside plain detection",
-    "step": "how far a step may go: first contacts, free step and trial steps beside all contacts",
+    "worlds": "many worlds in one call on CPUs, compared with one call per world",
+    "ropes": "ropes as edges, compared with thin triangles and with cloth",
+    "options": "the time that each option of a smaller model saves",
+    "distance": "separation, proximity, intersections, smallest distances, compared with plain detection",
+    "step": "first contacts, collision-free step and trial steps, compared with all contacts",
     "accuracy": "hard elementary and distance queries: false negatives and positives of each tier",
-    "gpu": "the GPU backend: ms a frame, with transfers and without, many worlds, stages",
-    "rigid": "meshes moved by poses and joints: found contacts against the truth, bounds, cost",
-    "ros": "the node over DDS: latency beside that of an echo, sustained rate, overload",
-    "robot": "a robot beside a cloth over DDS, moved by joint states: answers a second, latency",
+    "gpu": "the GPU backend: ms per frame with and without transfers, many worlds, stages",
+    "rigid": "meshes moved by poses and joints: contacts compared with the truth, bounds, cost",
+    "ros": "the node over DDS: latency compared with an echo, sustained rate, overload",
+    "robot": "a robot beside a cloth over DDS, moved by joint states: results per second, latency",
     "stop": "the topic stop over DDS: random approaches, silence, publisher and node killed",
-    "soak": "forty minutes of mixed load on the node: memory, counts, answers",
+    "soak": "forty minutes of mixed load on the node: memory, counts, results",
 }
 
 
-# What subjects and the processes that they start import.
+# Import paths of subjects and of the processes that they start.
 TEST = Path(__file__).resolve().parents[1]
 FOLDERS = [TEST, TEST / "support", TEST.parent / "build" / "oracle", TEST.parent / "examples" / "cloth_on_ball"]
 

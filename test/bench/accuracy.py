@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where each tier errs: hard elementary queries and distance queries, against rational arithmetic. (Of whole scenes:
-`hpccd bench accuracy`.)
+"""Errors of each tier on hard elementary queries and distance queries, compared with rational arithmetic. For whole
+scenes, see `hpccd bench accuracy`.
 
   python -m bench accuracy                        sweeps, then distance queries
   python -m bench accuracy --parts distance
 
-Sweeps: elementary queries at scales from 1e-150 to 1e148 and at distances from the origin up to 1e12 times their size,
-ordinary and degenerate ones, and hard ones as `make fuzz` makes them. Distance: separation, proximity and intersections
-on the scenes of HPCCD_DATA/distance, whose truth is known, and on hard queries.
+Sweeps: ordinary, degenerate and hard elementary queries (as `make fuzz` generates them), at scales from 1e-150 to 1e148
+and at distances from the origin up to 1e12 times their size. Distance: separation, proximity and intersections on the
+scenes of HPCCD_DATA/distance, whose truth is known, and on hard queries.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def _measure_distance(report, tiers, backends, sets, args):
 
 
 def _check(report):
-    """The promises of the tiers, on everything that was measured here."""
+    """Check the guarantees of the tiers on all measured queries."""
     for row in report.rows:
         where = row.get("scene") or row.get("generator") or f"{row['sweep']} {row['at']:g}, {row['queries']}"
         what, off = row.get("query", "contacts"), row.get("toc_worst", row.get("value_worst"))

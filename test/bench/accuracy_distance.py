@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where each tier errs in distance queries: against the truth in HPCCD_DATA/distance, and on hard queries as
-`make fuzz` makes them, against rational arithmetic."""
+"""Errors of each tier in distance queries: compared with the truth in HPCCD_DATA/distance, and with rational arithmetic
+on hard queries as `make fuzz` generates them."""
 
 from __future__ import annotations
 

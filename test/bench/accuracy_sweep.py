@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where each tier begins to err: elementary queries at growing scale, at growing distance from the origin, and made to
-be hard, each compared with the exact oracle of oracle on the very coordinates that the tier gets."""
+"""Errors of each tier on elementary queries at growing scale, at growing distance from the origin, and on hard queries,
+each compared with the exact oracle on the same coordinates."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Benchmarks on scenes so small that a run takes a second: their commands are tested here, not their figures."""
+"""Benchmarks on small scenes: a run takes a second. These tests check their commands, not their figures."""
 
 import functools
 import json

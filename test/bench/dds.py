@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the subjects over DDS share: a node of this process, the measured node as a process, and what that one reports.
+"""Shared by the subjects over DDS: a node in this process, the measured node as a process, and its reports.
 
-`python -m bench.dds --ros-args ...` runs the node with a note of when each frame passed through it. At its end it
-writes FILE (variable HPCCD_BENCH_TIMES): for each step [step, received, detected, published, detect_ms, core_ms], times
-in s of CLOCK_MONOTONIC, which all processes of a machine share.
+`python -m bench.dds --ros-args ...` runs the node and notes the times at which each frame passes. At its end it writes
+FILE (variable HPCCD_BENCH_TIMES): for each step [step, received, detected, published, detect_ms, core_ms], times in s
+of CLOCK_MONOTONIC, which all processes of a machine share.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Session:
         return {entry[0]: entry[1:] for entry in written}
 
     def spin_until(self, ready: Callable[[], bool], what: str) -> None:
-        """Take what comes until `ready()`; UserError where that lasts too long or a child fails."""
+        """Spin until `ready()`; UserError if that takes too long or a child fails."""
         deadline = time.monotonic() + PATIENCE
         while not ready():
             self.children.check()
@@ -79,7 +79,7 @@ class Session:
             self.executor.spin_once(timeout_sec=0.02)
 
     def spin(self, seconds: float) -> None:
-        """Take what comes within `seconds`."""
+        """Spin for `seconds`."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
             self.executor.spin_once(timeout_sec=left)

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Detection with a separation d and proximity within d, against d; intersections and smallest distances. Each beside
-plain detection of the same step.
+"""Detection with a separation d, proximity within d, intersections and smallest distances, each compared with plain
+detection of the same step.
 
   python -m bench distance                       the files of HPCCD_DATA, twisted rods, a body between rollers
   python -m bench distance cloth-ball --separations 1e-3,1e-2
-  python -m bench distance data --peer ipctk     side by side with ipctk (pip install ipctk)
+  python -m bench distance data --peer ipctk     compared with ipctk (pip install ipctk)
   python -m bench distance data --backend gpu --arrays device   positions on the GPU (torch or cupy)
 
-Choose d below the shortest edges of the scene. Where none is given, those beyond its median edge are left out.
-"/ plain" is the time over that of plain detection. "us a pair more": microseconds of a thread for each pair beyond the
-contacts (of a separation: 1.5 times the contacts), of the time beyond half of plain detection (of a separation: twice).
-Queries of one frame read the end of the step.
+Choose d below the shortest edges of the scene. Default values above its median edge are skipped.
+"/ plain" is the time divided by that of plain detection. "us a pair more" is thread time per additional pair, in
+microseconds: pairs beyond the contacts (with a separation: beyond 1.5 times the contacts), time beyond half of plain
+detection (with a separation: beyond twice). Queries of one frame use the end of the step.
 """
 
 from __future__ import annotations

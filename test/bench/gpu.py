@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The GPU and hybrid backends beside the CPU, and positions and results that stay on the device.
+"""The GPU and hybrid backends compared with the CPU, and positions and results that stay on the device.
 
   python -m bench gpu data                      the scene files of HPCCD_DATA, all parts
   python -m bench gpu cloth-ball --repeat 100 --parts frames
   python -m bench gpu --parts worlds --worlds 64,1024 --repeat 20
 
-  frames    ms a frame from host to host, and device time by stage (in calls of their own)
+  frames    ms per frame from host to host, and device time by stage (in separate calls)
   threads   Fig. 6 of Kim et al. 2009: threads by GPUs, default and published method
   device    from the device to the host, on the device, and in a CUDA graph (PyTorch or CuPy)
-  large     the same of two nets that meet nearly edge on edge (--sizes)
+  large     the same for two nets that collide nearly edge on edge (--sizes)
   worlds    contacts of a folded garment, and near pairs in a folded sheet, many times in one call (--worlds)
 
-Fails where results differ from the CPU's, or where a device left a frame to the CPU.
+Fails if results differ from the CPU's, or if a device left a frame to the CPU.
 """
 
 from __future__ import annotations

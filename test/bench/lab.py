@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all subjects share: options, the comparison of variants on the same steps, and tables whose columns are data."""
+"""Shared by all subjects: options, comparison of variants on the same steps, and tables whose columns are data."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def configure(
 
 
 def begin(args) -> tuple[Report, list[sources.Source]]:
-    """The report to fill and the sources that were asked for; UserError for wrong options, before anything is timed."""
+    """The report to fill and the selected sources; UserError for wrong options, before anything is timed."""
     for name, value in vars(args).items():
         if isinstance(value, (int, float)) and not 0 <= value < float("inf"):
             raise UserError(f"--{name.replace('_', '-')} {value}: must be a finite number, not below 0")
@@ -81,7 +81,7 @@ def thread_counts(text: str | None, default: Iterable[int]) -> list[int]:
 
 
 def require_backend(args, **others) -> None:
-    """UserError where --backend does not work here, or --arrays device does not fit to it."""
+    """UserError if --backend does not work here, or does not support --arrays device."""
     if getattr(args, "arrays", "host") == "device" and (args.backend != "gpu" or getattr(args, "peer", None)):
         raise UserError("--arrays device: needs --backend gpu, and no --peer: only a device reads them there")
     _, refused = usable("backend", [args.backend], **others)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Peak memory and bytes per triangle: what the detector reports, and what the operating system saw.
+"""Peak memory and bytes per triangle, as reported by the detector and by the operating system.
 
   python -m bench memory                      the files of HPCCD_DATA and the generated scenes of Table 1's sizes
   python -m bench memory n-body --methods default,published,naive,front
 
-"process" is the peak resident size of a fresh process that detects, less that of one that does all but the detecting.
+"process" is the peak resident size of a new process that detects, minus that of one that does everything else.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The methods and the instruction sets side by side, with all threads and with one. None changes a contact.
+"""The methods and the instruction sets compared, with all threads and with one. None changes a contact.
 
   python -m bench methods                        default, published, naive, front; scalar, avx2, avx512, neon
   python -m bench methods cloth-ball --repeat 11
 
-Node pairs and candidates show whether a method is faster because it does less, or the same in less time.
+Node pairs and candidates show whether a method does less work, or the same work in less time.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The time saved where a scene models only what it needs: each option alone, beside the full run, in turn.
+"""The time saved if a scene models only what it needs: each option on its own, compared with the full run.
 
   python -m bench options                     n-body-like-lr, cloth-drop and the files of HPCCD_DATA
   python -m bench options cloth-ball-like --steps 4
 
 "full" tests every mesh against every mesh and itself, none of them static, all contacts, without points and normals.
-Each other row changes one thing. The last two rows put a landscape that nothing touches around the scene, once as a
-mesh like any other and once as a static one.
+Each other row changes one option. The last two rows add a landscape that nothing touches, once as a deforming mesh and
+once as a static one.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The same steps by hpccd and by ipctk (the Python module of ipc-toolkit, pip install ipctk), in turn.
+"""The same steps by hpccd and by ipctk (the Python module of ipc-toolkit, pip install ipctk), alternating.
 
   python -m bench peer                           the files of HPCCD_DATA
   python -m bench peer run.mcap --steps 8
 
-ipctk looks for the earliest time only; its narrow phase (Tight-Inclusion) stops early on later contacts. Both see all
+ipctk computes the earliest time only; its narrow phase (Tight-Inclusion) stops early on later contacts. Both take all
 triangles as one mesh.
 """
 

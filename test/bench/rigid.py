@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes that move by poses and by joints: are their contacts found, how good are the bounds, what does a step cost.
+"""Meshes that move by poses and joints: completeness of contacts, tightness of bounds, cost of a step.
 
   python -m bench rigid                       100,000 random pairs by screws, as many by joints; bounds; cost
   python -m bench rigid --queries 4000 --parts truth
   python -m bench rigid --parts cost --turns 1,10 --tolerances 1e-2,1e-4
 
 truth: a vertex and a face, or two edges, that move by random screws (from next to nothing to half a turn, far from the
-origin, about axes near and far) or joints (up to eight that turn, slide or are fixed; some against each other), most of
-them shifted so that they come 1e-9 to 1e-3 of their size nearer or less near than the distance asked for. Each answer
-is held against branch and bound over time on the true motion. "missed": reported free though they come that near;
-"late": reported later than that; "beyond": reported though farther apart than the distance and twice the bound; "open":
-neither proven. Where any of these is not 0 the command fails. "in excess" is what is reported without coming that near,
-"worst": how much farther apart they were at most, over the bound.
-bounds: how far a vertex really is from its straight line, over the bound, for random motions of about that turn.
-cost: a step of a scene with a cloth and rigid meshes, moved by poses or joints: everything from poses to contacts, the
-cloth with itself in a detector of its own, which is asked once a step. Beside it one detect() of all of it with the
-vertices of rigid meshes on straight lines, their positions given. On a machine that others use look at the least times.
+origin, about axes near and far) or joints (up to eight that rotate, slide or are fixed; some against each other). Most
+are shifted so that their smallest distance is 1e-9 to 1e-3 of their size above or below the requested distance. Each
+result is compared with branch and bound over time on the true motion. "missed": false negatives; "late": reported too
+late; "beyond": reported although farther apart than the distance plus twice the bound; "open": neither is proven. The
+command fails if any of these is not 0. "in excess": false positives within the bound; "worst": the largest excess
+distance, divided by the bound.
+bounds: the true distance of a vertex from its straight line, divided by the bound, for random rotations of this angle.
+cost: a step of a scene with a cloth and rigid meshes, from poses to contacts; a second detector tests the cloth against
+itself, once per step. Compared with one detect() of the whole scene with all vertices on straight lines. On a shared
+machine, compare the smallest times.
 """
 
 from __future__ import annotations

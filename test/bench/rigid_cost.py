@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a step costs in which rigid meshes move by poses or joints, beside the same step on straight lines."""
+"""Cost of a step in which rigid meshes move by poses or joints, compared with the same step on straight lines."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ _MOST_PARTS = 64
 
 @dataclass(frozen=True, eq=False)
 class _Subject:
-    """A cloth, then so many rigid meshes with the faces of a ball; links in a row ignore their neighbours.
+    """A cloth, then rigid meshes with the faces of a ball; links in a row ignore their neighbours.
 
-    `motions(degrees)`: of all meshes, made anew for each step, as a node has to.
+    `motions(degrees)`: motions of all meshes, computed for each step as a node does.
     """
 
     name: str

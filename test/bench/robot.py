@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A robot beside a cloth over DDS: the scene arm-and-cloth streamed at a rate, the arm as its joint states; how many
-steps are answered, and how long after the frame was sent: in all, in the detection, in its core, and beside the core.
-The table, which stands still, is sent once, as docs/meshes.md describes.
+"""A robot beside a cloth over DDS: the scene arm-and-cloth at a fixed rate, with the arm as joint states. Reports the
+number of results and the latency from the frame to its result: total, detection, core, and overhead of the node.
+The static table is sent once, as docs/meshes.md describes.
 
   python -m bench robot                         1,501 frames at 250 a second: 6 s of motion
   python -m bench robot --rate 500 --threads 1
   python -m bench robot --backend gpu
-  python -m bench robot --distances             with the smallest distance of each pair of meshes, beside contacts
+  python -m bench robot --distances             with the smallest distance of each pair of meshes, besides contacts
 
-Fails where a frame is not accounted for.
+Fails if a frame is not accounted for.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ropes as edges, beside the same ropes as thin triangles and beside cloth with as many edges.
+"""Ropes as edges, compared with the same ropes as thin triangles and with cloth of as many edges.
 
   python -m bench ropes --segments 10000,100000 --segments-a-rope 100
 

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The node over DDS, as a process of its own: latency from publish to contacts less the core's time, beside an echo
-that moves messages of the same types and sizes in and out (in turn, in one run); the loop of a solver that asks
-~/detect how far it may go and waits for the answer, beside the same call in process; the highest rate without drops;
-and what happens at twice that rate: latest frames answered, every drop counted, memory flat.
+"""The node as a process over DDS: latency from publish to contacts minus the core's time, compared with an echo of
+messages of the same types and sizes (alternating, in one run); a solver that requests ~/detect for its step size,
+compared with the same call in process; the highest rate without drops; and behaviour at twice that rate: newest frames
+computed, every drop counted, constant memory.
 
   python -m bench ros                           cloth-ball (the file in HPCCD_DATA, else the generated one), cloth-drop
   python -m bench ros cloth-drop --repeat 1000
   python -m bench ros data --seconds 0          latency and loop alone
 
-A step is played there and back again; its meshes are sent as one, in single precision. Fails where contacts or
-steps differ from the core's own, a frame is unaccounted for, or the latency exceeds twice that of the echo (--limit).
+A step is played forwards and backwards; its meshes are sent as one, in single precision. Fails if contacts or step
+sizes differ from the core's, a frame is unaccounted for, or the latency exceeds twice that of the echo (--limit).
 """
 
 from __future__ import annotations

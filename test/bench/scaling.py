@@ -5,8 +5,8 @@
   python -m bench scaling n-body-like-lr --threads-list 1,2,3,4 --methods default,naive
 
 Methods: default, published (sections 3 and 4 of the paper), naive (section 3.2) and front (Tang et al. 2009). The
-speed-up of a method is over itself with one thread. All must find the same contacts. "independent": as many detectors
-of one thread each, all at once, which share nothing: the most that the machine gives.
+speed-up of a method is relative to itself with one thread. All must find the same contacts. "independent": as many
+detectors of one thread each, all at once, without shared data: the limit of the machine.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How time and memory grow with the number of triangles: the same motion, meshed coarser and finer.
+"""Growth of time and memory with the number of triangles: the same motion with coarser and finer meshes.
 
   python -m bench size                                two scenes at 1/4, 1 and 4 times the triangles
   python -m bench size n-body-like-lr --sizes 0.25,0.5,1,2,4

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Minutes or hours of mixed load on a node in a process of its own: streams of four meshes, one of them with sixteen
-changes of topology in every run, one from a publisher that is ended or killed and started again; wrong messages of
-ten kinds; a misspelt mesh; right and wrong requests to ~/detect. Every 25th answer (--check-every) is computed again.
+"""Minutes or hours of mixed load on a node process: streams of four meshes, one of them with sixteen changes of
+topology per run, one from a publisher that is ended or killed and restarted; invalid messages of ten kinds; a misspelt
+mesh; valid and invalid requests to ~/detect. Every 25th result (--check-every) is recomputed.
 
   python -m bench soak                          forty minutes, about a tenth of the machine
   python -m bench soak --minutes 1 --rate 30 --memory-limit 10
 
-In the warm-up the node is held up (SIGSTOP) until what waits for it is as much as it can be, in its queues and in the
-shared memory of the publisher: what it takes for that counts as its own from then on, whenever it comes.
+During the warm-up the node is stopped (SIGSTOP) until its queues and the publisher's shared memory are full. This
+memory then counts as the node's from the beginning.
 
-Fails where the node ends, an answer is wrong, a counter does not add up, or its resident memory changes by more than
+Fails if the node ends, a result is wrong, counters do not add up, or resident memory changes by more than
 --memory-limit between the beginning (after --warm-up) and the end.
 """
 

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far a step may go: all contacts, the first ones, the collision-free step, and trial steps from a known start.
+"""Step size queries: all contacts, the first ones, the collision-free step, and trial steps from a known start.
 
   python -m bench step                        the files of HPCCD_DATA, twisted rods, pieces that swarm
-  python -m bench step cloth-ball --peer ipctk   side by side with ipctk (pip install ipctk)
+  python -m bench step cloth-ball --peer ipctk   compared with ipctk (pip install ipctk)
   python -m bench step cloth-ball-trial       trial steps of the solver in examples/cloth_on_ball
   python -m bench step data --backend gpu --arrays device   positions lie on the GPU (torch or cupy)
 
-all, first: detect() with that report; step: collision_free_step(). Two starts take turns, the step as it is and the
-same shifted by a sixteenth of its size, so that a detector cannot use what it knows of a start. trial: the same
-as a line search asks, from one start: the whole step, three quarters and half of it, and one turned by 5 degrees, after
-a few that are not timed, of which the second lists the near pairs ("listing").
+all, first: detect() with that report; step: collision_free_step(). Two starts alternate, the original one and one
+shifted by a sixteenth of the scene's size, so that the detector cannot reuse the state of the last start. trial:
+queries of a line search from one start: the whole step, three quarters and half of it, and one rotated by 5 degrees,
+after untimed calls, the second of which computes the near list ("listing").
 """
 
 from __future__ import annotations

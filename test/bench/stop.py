@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The topic stop over DDS, as a StopListener hears it: random approaches of two deforming meshes, each step judged by
-brute force; silence after each of them; mesh publisher and node killed and held up. And what it costs beside contacts.
+"""The topic stop over DDS, received by a StopListener: random approaches of two deforming meshes, each step compared
+with brute force; silence after each; mesh publisher and node killed or suspended. Also its cost compared with contacts.
 
   python -m bench stop                          1,000 approaches and silences, 20 ends of each kind: quarter of an hour
   python -m bench stop --trials 20 --ends 2
 
-Fails where stop misses a step that comes near, rises more than a frame after it, or more than --margin after the
-time-out of what has ended.
+Fails if stop misses a step closer than stop_distance, rises more than one frame after it, or more than --margin after
+the time-out of a source that ended.
 """
 
 from __future__ import annotations

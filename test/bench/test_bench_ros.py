@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The benchmark and the soak of the node, short: what they check must hold, and they must see what is wrong."""
+"""Short runs of the node's benchmark and soak: their checks pass, and detect faults."""
 
 import json
 import os

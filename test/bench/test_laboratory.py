@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m bench ...` at tiny sizes: each subject runs, and fails where what it compares differs."""
+"""`python -m bench ...` at tiny sizes: each subject runs, and fails if compared results differ."""
 
 import argparse
 import collections

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`hpccd bench ...`: what a user measures, and the messages for wrong options."""
+"""`hpccd bench ...`: results, and messages for wrong options."""
 
 import collections
 

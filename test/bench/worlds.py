@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Many worlds in one call on CPUs, beside detectors of one thread that are asked for one world at a time.
+"""Many worlds in one call on CPUs, compared with detectors of one thread and one call per world.
 
   python -m bench worlds                              64 worlds of two scenes, at steps spread over the motion
   python -m bench worlds two-triangles --worlds 64,1024
 
-All ms are of all worlds. "one call": of all threads; "1 thread": the same with one. "one detector": asked for each
-world in turn. "a detector each": one for each world (up to 1,024, as they take memory). "of all threads": the time
-inside the core of the one detector over that of one call and its threads; 1 where each thread is as fast as one alone.
-Contacts of each world are compared in the last round.
+All ms are for all worlds. "one call": on all threads; "1 thread": on one. "one detector": one call per world. "a
+detector each": one detector per world (at most 1,024, because they need memory). "of all threads": core time of the one
+detector divided by that of one call times its threads; 1 if each thread is as fast as on its own. Contacts of each
+world are compared in the last round.
 """
 
 from __future__ import annotations
