@@ -18,9 +18,9 @@ from .steps import EARLY, contradict
 SIMD = ("scalar", "avx2", "avx512", "neon")
 QUESTIONS = (CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS, DISTANCES, STEP)
 
-# Promised by `exact`: within this of the true time; within this, times the size of the query, of the true distance.
+# Guarantee of `exact`: error of the time; error of the distance, relative to the size of the query.
 TOLERANCE = 1e-12
-# Their answers are times, which `conservative` may report too early but not too late.
+# Results that are times: `conservative` may report them too early but not too late.
 OF_A_STEP = (CONTACT, SEPARATION)
 
 Tallies = dict[tuple[str, str, str], "Tally"]  # by question, accuracy and kind
@@ -28,7 +28,7 @@ Tallies = dict[tuple[str, str, str], "Tally"]  # by question, accuracy and kind
 
 @dataclass(frozen=True)
 class Disagreement:
-    """How one tier's answers differ from the oracle's, for each query.
+    """How the results of one tier differ from the oracle's, for each query.
 
     late: time - true time, or distance - true distance in sizes of the query; NaN without both.
     """
@@ -40,9 +40,9 @@ class Disagreement:
     question: str = CONTACT
 
     def broken_promises(self, accuracy: str) -> np.ndarray:
-        """Mask of the queries at which the tier does not do what its name promises.
+        """Mask of the queries that violate the guarantees of the tier.
 
-        fast and balanced promise nothing but the same answer from all instruction sets.
+        `fast` and `balanced` guarantee only the same result with all instruction sets.
         """
         if self.question == STEP and accuracy in ("exact", "conservative"):
             return self.uneven | self.invented | ~((self.late <= 0) & (self.late >= -EARLY))
@@ -87,7 +87,7 @@ class Tally:
 
 
 def batches(seed: int, size: int, asked: Sequence[str] = QUESTIONS) -> Iterator[Batch]:
-    """Batches without end: the questions and their kinds in turn, of each the generators in turn.
+    """Endless batches: cycle through questions, kinds and generators.
 
     The same seed and number give the same batch.
     """
@@ -102,9 +102,9 @@ def batches(seed: int, size: int, asked: Sequence[str] = QUESTIONS) -> Iterator[
 
 
 def compare(batch: Batch, accuracy: str, simd: Sequence[str], truth: Answers) -> Disagreement:
-    """Ask one tier on each instruction set; the first one's answers are compared with the truth.
+    """Query one tier with each instruction set; the results of the first are compared with the truth.
 
-    Raises AssertionError where an answer is not one at all: NaN, or a time outside [0,1].
+    Raises AssertionError for an invalid result: NaN, or a time outside [0,1].
     """
     true_hit, true_value = truth
     (hit, value), *others = (questions.answers(batch, accuracy, s) for s in simd)
@@ -137,7 +137,7 @@ def compare(batch: Batch, accuracy: str, simd: Sequence[str], truth: Answers) ->
 def add_batch(
     tallies: Tallies, batch: Batch, accuracies: Sequence[str], *, simd: Sequence[str] = ("auto",), threads: int = 0
 ) -> None:
-    """Ask the oracle (on so many threads) and each tier, and add what comes out to tallies."""
+    """Query the oracle (on `threads` threads) and each tier, and add the results to tallies."""
     truth = questions.truth(batch, threads)
     for accuracy in accuracies:
         difference = compare(batch, accuracy, simd, truth)

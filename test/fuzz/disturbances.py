@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What may happen to a degenerate query on its way to the tests: permutation, shift, scale, rounding, one ulp."""
+"""Random changes of degenerate queries: permutation, shift, scale, rounding, one ulp."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .generators import VERTEX_FACE
 
 
 def disturb(rng: np.random.Generator, q: np.ndarray, kind: str) -> np.ndarray:
-    """Apply a random choice of the functions below, each query its own. q: (n,8,3) float64; returns the same shape."""
+    """Apply random functions of those below, chosen for each query. q: (n,8,3) float64; returns the same shape."""
     q = permute(rng, q, kind)
     for change, share in ((uneven, 0.1), (rotate, 0.1), (offset, 0.3), (scale, 0.4), (single, 0.15), (one_ulp, 0.3)):
         chosen = rng.random(len(q)) < share
@@ -47,7 +47,7 @@ def disturb_still(rng: np.random.Generator, points: np.ndarray) -> np.ndarray:
 
 
 def permute(rng: np.random.Generator, q: np.ndarray, kind: str) -> np.ndarray:
-    """Another order of the triangle's corners, or of the edges and their ends; the answer stays."""
+    """Permute the triangle's corners, or the edges and their ends; the result stays the same."""
     n = len(q)
     if kind == VERTEX_FACE:
         corners = rng.permuted(np.tile([1, 2, 3], (n, 1)), axis=1)
@@ -60,7 +60,7 @@ def permute(rng: np.random.Generator, q: np.ndarray, kind: str) -> np.ndarray:
 
 
 def uneven(rng: np.random.Generator, q: np.ndarray) -> np.ndarray:
-    """Shrink two of the four points' coordinates, or motion against size, by a power of two: huge beside tiny."""
+    """Shrink coordinates of two of the four points, or motion relative to size, by a power of two."""
     q = q.copy()
     factor = 2.0 ** -rng.integers(1, 45, size=(len(q), 1, 1))
     points = rng.random(len(q)) < 0.5

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Queries at which a promise was broken, in a file, to be run again."""
+"""A file of queries that violated a guarantee, to run them again."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .questions import Batch
 
 
 def save_failing(path: Path, tallies: Tallies) -> bool:
-    """Write them; whether there are any. Keys are question|accuracy|kind, and the same with |distances."""
+    """Write the queries; returns whether there are any. Keys: question|accuracy|kind, and the same with |distances."""
     arrays = {}
     for key, tally in tallies.items():
         if tally.failing:

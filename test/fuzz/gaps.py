@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small scenes of eight points and the smallest distances of their meshes, by the core and by the oracle.
 
-For each pair of meshes two answers: (do they touch, the distance told) and (do they intersect, the oracle's distance
-of the features named).
+Two results for each pair of meshes: (do they touch, the reported distance) and (do they intersect, the oracle's
+distance of the reported features).
 """
 
 from __future__ import annotations

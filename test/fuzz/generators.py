@@ -2,9 +2,8 @@
 """Elementary queries that aim at degeneracies.
 
 A generator takes (rng, n) and returns (n,8,3) float64 whose coordinates are small integers or random reals: rows are
-four points at t=0, then the same four at t=1 (v f0 f1 f2, or a0 a1 b0 b1: the kind decides how they are read). Small
-integers make degenerate configurations exact and leave room to shift and scale them without rounding, which is the
-business of `disturbances`.
+four points at t=0, then the same four at t=1 (v f0 f1 f2 or a0 a1 b0 b1, depending on the kind). Small integers make
+degenerate configurations exact, and `disturbances` can shift and scale them without rounding.
 """
 
 from __future__ import annotations
@@ -57,7 +56,7 @@ def on_line(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 def meeting_vertex_face(rng: np.random.Generator, n: int) -> np.ndarray:
-    """A vertex that is in the triangle, on its border or just beside it at a rational time, 0 and 1 among them."""
+    """A vertex that is in the triangle, on its border or just beside it at a rational time, including 0 and 1."""
     corners = 4 * rng.integers(-2, 3, size=(n, 3, 3))
     vertex = barycentric_quarters(rng, corners)
     return _moving_through(rng, np.concatenate([vertex[:, None], corners], axis=1))
@@ -70,7 +69,7 @@ def barycentric_quarters(rng: np.random.Generator, corners: np.ndarray) -> np.nd
 
 
 def meeting_edge_edge(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Edges that cross, touch with an end or pass just beside each other at a rational time, 0 and 1 among them."""
+    """Edges that cross, touch with an end or pass just beside each other at a rational time, including 0 and 1."""
     ends = 4 * rng.integers(-2, 3, size=(n, 3, 3))
     a0, a1, b0 = ends[:, 0], ends[:, 1], ends[:, 2]
     place = rng.integers(-1, 6, size=(n, 1))
@@ -140,7 +139,7 @@ def generic(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 def grazing(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Random reals that meet at a feature's border at a random time but for rounding and a hair's breadth."""
+    """Random reals that touch at a feature's border at a random time, up to rounding and a tiny offset."""
     corners = rng.uniform(-1, 1, size=(n, 3, 3))
     weights = rng.dirichlet([1, 1, 1], size=n)
     hair = rng.choice([0.0, 1e-17, 1e-16, 1e-15, 1e-12, 1e-8], size=n) * rng.choice([-1, 1], size=n)
@@ -153,7 +152,7 @@ def grazing(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 def grazing_edge_edge(rng: np.random.Generator, n: int) -> np.ndarray:
-    """As `grazing`: one edge's end meets the other edge, or edges are all but parallel when they meet."""
+    """As `grazing`: an end of one edge touches the other edge, or edges are almost parallel when they touch."""
     ends = rng.uniform(-1, 1, size=(n, 4, 3))
     a0, a1, b0, b1 = (ends[:, i] for i in range(4))
     place = rng.choice([0.0, 1.0, 0.5], size=(n, 1)) + rng.choice([0.0, 1e-16, -1e-16, 1e-12, -1e-9], size=(n, 1))
@@ -167,7 +166,7 @@ def grazing_edge_edge(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 def near_multiple_root(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Coplanarity polynomials whose double and triple roots are split, or turned complex, by a hair."""
+    """Coplanarity polynomials with double and triple roots that a tiny change splits or makes complex."""
     q = chosen_roots(rng, n)
     q += rng.choice([0.0, 1e-16, 1e-13, 1e-9, 1e-5], size=(n, 1, 1)) * rng.uniform(-1, 1, size=(n, 8, 3))
     return q

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Changes of queries for the search for the slowest ones: small and large, most of them towards odd magnitudes."""
+"""Mutations for the search for slow queries: small and large ones, most of them towards unusual magnitudes."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Elementary queries at a distance: a generator takes (rng, n) and returns (n,8,3) queries and (n,) distances.
 
-Distances that are exact come from configurations along the axes, whose distances one sees, turned by integer frames:
-rows of equal length at right angles, the lengths integers too (Pythagorean quadruples).
+Exact distances come from configurations along the axes, rotated by integer frames: orthogonal rows of equal integer
+length (Pythagorean quadruples).
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def in_a_frame(rng: np.random.Generator, local: np.ndarray, height: np.ndarray) 
 
 
 def over_a_face(rng: np.random.Generator, n: int) -> NearQueries:
-    """A vertex that glides over a triangle's plane at the distance, arrives at it, or starts there."""
+    """A vertex that moves parallel to a triangle's plane at the distance, arrives at it, or starts there."""
     local = rng.integers(-4, 5, size=(n, 8, 3))
     local[:, [0, 4], :2] *= rng.integers(1, 4, size=(n, 1, 1))
     still = rng.random(n) < 0.5
@@ -58,7 +58,7 @@ def over_a_face(rng: np.random.Generator, n: int) -> NearQueries:
 
 
 def over_a_border(rng: np.random.Generator, n: int) -> NearQueries:
-    """A vertex that passes over a triangle's edge or corner and is as near as the distance once, in passing."""
+    """A vertex that passes over a triangle's edge or corner and reaches the distance once."""
     local = np.zeros((n, 8, 3), dtype=int)
     local[:, 1:4, 0] = rng.integers(-3, 4, size=(n, 3))
     local[:, 3, 2] = -rng.integers(0, 4, size=n)
@@ -69,7 +69,7 @@ def over_a_border(rng: np.random.Generator, n: int) -> NearQueries:
 
 
 def crossing_planes(rng: np.random.Generator, n: int) -> NearQueries:
-    """Edges in two planes the distance apart, or that come to be so: gliding, parallel, on one line."""
+    """Edges in two planes at the distance, or that reach it: moving within the planes, parallel, collinear."""
     local = rng.integers(-4, 5, size=(n, 8, 3))
     still = rng.random(n) < 0.5
     local[still, 4:6] = local[still, :2]
@@ -85,7 +85,7 @@ def crossing_planes(rng: np.random.Generator, n: int) -> NearQueries:
 
 
 def end_over_an_edge(rng: np.random.Generator, n: int) -> NearQueries:
-    """An edge whose end passes over the other edge and is as near as the distance once, in passing."""
+    """An edge whose end passes over the other edge and reaches the distance once."""
     local = np.zeros((n, 8, 3), dtype=int)
     local[:, :2, 0] = rng.integers(-3, 4, size=(n, 2))
     local[:, 4:6] = local[:, :2]

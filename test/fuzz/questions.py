@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the core and the oracle are asked: contact, separation, proximity, intersections of single pairs; distances of
-the meshes of small scenes, and how far these may go."""
+"""Queries to the core and the oracle: contact, separation, proximity and intersections of single pairs; distances and
+collision-free steps of small scenes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .steps import STEP_MOTIONS, core_steps, true_steps
 CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS = "contact", "separation", "proximity", "intersections"
 DISTANCES, STEP = "distances", "step"
 OF_SCENES = (DISTANCES, STEP)
-PAIRS_OF_A_SCENE = 10  # so many fewer scenes than single pairs are in a batch: each asks about dozens of pairs
+PAIRS_OF_A_SCENE = 10  # a batch has a tenth as many scenes as single pairs: each scene has dozens of pairs
 
 # hit (Q,) bool; value (Q,) float64: time, distance, or 0. Of distances (Q,N): several answers for each scene.
 Answers = tuple[np.ndarray, np.ndarray]
@@ -72,7 +72,7 @@ def generated(question: str, kind: str, generator: str, rng: np.random.Generator
 
 
 def truth(batch: Batch, threads: int = 0) -> Answers:
-    """What the oracle says, on so many threads."""
+    """The oracle's results, on `threads` threads."""
     if batch.question == DISTANCES:
         return true_gaps(batch.kind, batch.queries)
     if batch.question == STEP:
@@ -91,7 +91,7 @@ def truth(batch: Batch, threads: int = 0) -> Answers:
 
 
 def answers(batch: Batch, accuracy: str, simd: str) -> Answers:
-    """What the core says."""
+    """The core's results."""
     if batch.question in (CONTACT, SEPARATION):
         return _times(batch, accuracy, simd)
     if batch.question == DISTANCES:
@@ -102,7 +102,7 @@ def answers(batch: Batch, accuracy: str, simd: str) -> Answers:
 
 
 def size_of(batch: Batch) -> np.ndarray:
-    """What an error of a value is measured by: a step, or the largest coordinate."""
+    """The unit of an error: a step, or the largest coordinate."""
     if batch.question not in (PROXIMITY, DISTANCES):
         return np.ones(len(batch.queries))
     return np.maximum(np.abs(batch.queries).max(axis=(1, 2)), np.finfo(float).tiny)

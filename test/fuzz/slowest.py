@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Search for the elementary queries that take the exact tier longest: `python -m fuzz.slowest --help`."""
+"""Search for the slowest elementary queries of the exact tier: `python -m fuzz.slowest --help`."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Herd:
     seconds: list[float] = field(default_factory=list)
 
     def offer(self, query: Query) -> None:
-        """Measure a query and keep it if it is among the slowest, which a second look must confirm."""
+        """Measure a query and keep it if it is among the slowest, confirmed by a second measurement."""
         bar = self.seconds[-1] if len(self.seconds) == self.size else 0.0
         if seconds_of(self.question, self.kind, query, 2) <= bar:
             return
@@ -61,9 +61,9 @@ class Herd:
 
 
 def seconds_of(question: str, kind: str, query: Query, repeats: int) -> float:
-    """Processor time of one query, the shortest of so many; the call from Python, about 10 us, included.
+    """CPU time of one query, the shortest of several runs, including about 10 us for the call from Python.
 
-    Of this thread: other processes that run meanwhile do not count. A snapshot is a scene of its own, with boxes and a
+    Time of this thread only, so other processes do not count. A query of one frame builds a scene with boxes and a
     tree: about 30 us more.
     """
     points, distance = query
@@ -83,7 +83,7 @@ def seconds_of(question: str, kind: str, query: Query, repeats: int) -> float:
 
 
 def seeds(rng: np.random.Generator, question: str, kind: str) -> list[Query]:
-    """One query of each generator as it is, and one whose coordinates lie far apart in magnitude."""
+    """One query of each generator, and one whose coordinates differ widely in magnitude."""
     queries = []
     for generator in generators_of(question, kind).values():
         made = generator(rng, 1)
@@ -95,7 +95,7 @@ def seeds(rng: np.random.Generator, question: str, kind: str) -> list[Query]:
 
 
 def improve(rng: np.random.Generator, herd: Herd, span: int) -> None:
-    """Offer one new query: now and then from nowhere, most often a change of one of the slowest."""
+    """Offer one new query: most often a mutation of one of the slowest, sometimes a random one."""
     if len(herd.queries) < 2 or rng.random() < 0.02:
         for query in seeds(rng, herd.question, herd.kind):
             herd.offer(within_range(query, span))
@@ -176,7 +176,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--seconds", type=float, default=60.0, help="how long (default 60)")
     p.add_argument("--restart", type=float, default=30.0, help="seconds after which a new search begins (default 30)")
-    p.add_argument("--keep", type=int, default=20, help="so many queries of each kind (default 20)")
+    p.add_argument("--keep", type=int, default=20, help="queries to keep of each kind (default 20)")
     p.add_argument("--seed", type=int, default=0, help="of the random numbers; times decide too, so runs differ")
     p.add_argument("--question", choices=(*QUESTIONS, "all"), default="all")
     p.add_argument(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Points at rest that aim at degeneracies: (n,4,3) with distances for proximity, (n,5,3) for edges and faces."""
+"""Degenerate points at rest: (n,4,3) with distances for proximity, (n,5,3) for edges and faces."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def through_a_point(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 def needles_on_a_line(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Five points of one line, rounded to single precision: a needle in a plane that double precision hardly knows."""
+    """Five points of one line, rounded to single precision: a needle whose plane is ill-conditioned."""
     start, along = rng.standard_normal((2, n, 1, 3))
     return (start + rng.uniform(-1, 1, size=(n, 5, 1)) * along).astype(np.float32).astype(float)
 

@@ -33,7 +33,7 @@ def thrown(rng: np.random.Generator, n: int, scene: SmallScene) -> np.ndarray:
 
 
 def wound(rng: np.random.Generator, n: int, scene: SmallScene) -> np.ndarray:
-    """Rolled up to a spiral, some to a screw: patches whose normals turn all the way, or overlap all in one plane."""
+    """Rolled up to a spiral, some to a helix: patches whose normals cover all directions, or overlap in one plane."""
     ends = []
     axis = rng.integers(0, 2, n)
     for _ in range(2):
@@ -87,7 +87,7 @@ def lattice(rng: np.random.Generator, n: int, scene: SmallScene) -> np.ndarray:
 
 
 def apart(rng: np.random.Generator, n: int, scene: SmallScene) -> np.ndarray:
-    """All by one vector, and a little more: hardly any contact."""
+    """All vertices by one vector, plus a little noise: almost no contact."""
     ends = scene.rest + rng.normal(0, 0.05, (2, n, *scene.rest.shape))
     return _between(ends[0], ends[1] + rng.normal(0, 3, (n, 1, 3)))
 
@@ -105,8 +105,8 @@ DISTURBANCES = ((rotate, 0.1), (offset, 0.1), (scale, 0.2), (extreme, 0.02), (si
 
 
 def motions_of(scene: SmallScene, name: str) -> Callable[[np.random.Generator, int], tuple[np.ndarray, np.ndarray]]:
-    """Disturbed, though less than single pairs are, of which fewer would be left free at the start; with separations of
-    which half are 0."""
+    """Disturbed less than single pairs, so that more scenes are free of contacts at the start; half of the separations
+    are 0."""
 
     def generate(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
         made = MOTIONS[name](rng, n, scene)

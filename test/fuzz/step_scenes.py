@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Topologies of small scenes whose steps are asked for, with a shape of rest for each: sheets, bands, bodies, and what
-meshes of careless users look like."""
+"""Topologies of small scenes for step queries, with rest positions: sheets, bands, bodies, and malformed meshes."""
 
 from __future__ import annotations
 
@@ -50,7 +49,7 @@ def ring(n: int, turns: float, flat: bool = False) -> tuple[np.ndarray, np.ndarr
 
 
 def careless() -> tuple[np.ndarray, np.ndarray]:
-    """Three faces on an edge, a face twice, another turned over, faces that name a vertex twice, discs joined at one
+    """Three faces at an edge, a duplicate face, a flipped one, faces that name a vertex twice, discs joined at a
     vertex."""
     faces = [
         [0, 1, 2],

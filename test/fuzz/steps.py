@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far small scenes may go, by the core and by the oracle; and whether all that the core says of a step agrees.
+"""Collision-free steps of small scenes by the core and by the oracle; and consistency of all results for a step.
 
-One detector serves all scenes of a topology, so that what it keeps of one start could spoil the answer to the next.
+One detector computes all scenes of a topology, so an error in state kept from one start affects the next.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from hpccd_core.options import FEATURES
 from .step_motions import MOTIONS, motions_of
 from .step_scenes import SMALL_SCENES
 
-# Promised by `exact` and `conservative`: at most so much of a step before the true time.
+# Guarantee of `exact` and `conservative`: the step ends at most this much before the true time.
 EARLY = 1e-9
 SHORTER = 0.625  # a part of the step that is asked for too, as line searches do
 
@@ -25,7 +25,7 @@ STEP_MOTIONS = {kind: {name: motions_of(scene, name) for name in MOTIONS} for ki
 
 
 def true_steps(kind: str, queries: np.ndarray, distances: np.ndarray, threads: int) -> tuple[np.ndarray, np.ndarray]:
-    """hit: whether anything touches, value: how far the scenes may go; queries: (Q,2V,3)."""
+    """hit: whether there is a contact; value: the collision-free step; queries: (Q,2V,3)."""
     scene = SMALL_SCENES[kind]
     starts, ends = _ends(queries)
     toc = oracle.earliest_contacts(
@@ -51,9 +51,9 @@ def core_steps(
 
 
 def contradict(kind: str, queries: np.ndarray, distances: np.ndarray, accuracy: str, simd: str) -> np.ndarray:
-    """Mask of the scenes of which the core says what does not fit together: `first` is not the earliest contacts of
-    `all`; the step is not theirs; it is another one when the same start was seen before; or, where one kind of contact
-    is all that is tested, contacts and step are not those that the full answer has of it."""
+    """Mask of the scenes with inconsistent results: `first` is not the earliest contacts of `all`; the step does not
+    end at their time; it differs when the start repeats; or, if only one kind of feature is tested, contacts and step
+    differ from those of this kind in the full result."""
     ask = _Asked(kind, accuracy, simd)
     starts, ends = _ends(queries)
     return np.array([not ask.agrees(*scene) for scene in zip(starts, ends, distances, strict=True)], bool)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Slow oracles that the core is compared with: exact elementary tests and brute force over all pairs.
 
-Everything is decided in integer arithmetic of any size on the coordinates as given; nothing is shared with the core's
-own arithmetic or traversal. Meaning of a contact as in Kim et al. 2009, section 3.1: vertices move on straight lines,
-features are closed, touching counts, `toc` is the earliest time in [0,1]. Distances are Euclidean, `<=` throughout.
+All decisions use integers of any size on the coordinates as given, without code of the core. Contacts are defined as in
+Kim et al. 2009, section 3.1: vertices move on straight lines, features are closed, touching counts, `toc` is the
+earliest time in [0,1]. Distances are Euclidean, `<=` throughout.
 """
 
 try:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long two moving features certainly stay apart, in double precision: what spares the oracle most exact tests where
-// only the earliest contact counts.
+// A time up to which two moving features certainly stay apart, in double precision. With it the oracle omits most exact
+// tests if only the earliest contact counts.
 #pragma once
 
 #include <cstddef>

@@ -44,7 +44,7 @@ py::array_t<T> column(const std::vector<T>& values) {
   return py::array_t<T>(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
-// of(i) for each i < count, on so many threads.
+// of(i) for each i < count, on the given number of threads.
 template <class T, class Of>
 py::array_t<T> computed(std::size_t count, unsigned threads, const Of& of) {
   py::array_t<T> array(static_cast<py::ssize_t>(count));

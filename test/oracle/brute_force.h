@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// All answers of a scene, by the exact tests on every pair whose boxes do not rule it out.
+// All results of a scene, by exact tests of every pair whose boxes overlap.
 #pragma once
 
 #include <array>
@@ -25,7 +25,7 @@ using Separations = std::vector<std::vector<double>>;
 Pairs contacts(const Meshes& meshes, const std::vector<Point>& t0, const std::vector<Point>& t1,
                const Separations& separations, unsigned threads);
 
-// The same of one snapshot: pairs within the distance, with the rounded distances.
+// The same for one frame: pairs within the distance, with the rounded distances.
 Pairs proximity(const Meshes& meshes, const std::vector<Point>& vertices, double distance, unsigned threads);
 
 // Every edge against every face: two vertices, face.

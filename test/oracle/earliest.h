@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The earliest contact of a scene alone: what all its contacts cost is too much for a million scenes.
+// Only the earliest contact of a scene: computing all contacts takes too long for a million scenes.
 #pragma once
 
 #include <vector>

@@ -24,14 +24,14 @@ def vertex_face(queries: np.ndarray, threads: int = 0) -> tuple[np.ndarray, np.n
 def edge_edge(queries: np.ndarray, threads: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """Exact contact of two moving closed segments.
 
-    queries: (Q,8,3) finite float32 or float64; rows a0 a1 b0 b1 at t=0, then the same at t=1. Everything else as
-    in `vertex_face`.
+    queries: (Q,8,3) finite float32 or float64; rows a0 a1 b0 b1 at t=0, then the same at t=1. Results as in
+    `vertex_face`.
     """
     return _hit_and_toc(_oracle.edge_edge(_checked("queries", queries, 8), threads))
 
 
 def separation_vertex_face(queries: np.ndarray, distance: ArrayLike, threads: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Whether and when a moving vertex and a moving closed triangle first are within a distance (one, or (Q,) of them).
+    """Whether and when a moving vertex and a moving closed triangle first are within a distance (scalar or (Q,)).
 
     Queries and results as in `vertex_face`; 0 is contact.
     """
@@ -56,7 +56,7 @@ def distance_edge_edge(points: np.ndarray, threads: int = 0) -> np.ndarray:
 
 
 def squared_distance_vertex_face(points: np.ndarray) -> list[Fraction]:
-    """The squares of the distances of points (Q,4,3), rows v f0 f1 f2, not rounded at all."""
+    """The exact squared distances of points (Q,4,3), rows v f0 f1 f2."""
     return _squared(_oracle.squared_distance_vertex_face, points)
 
 
@@ -66,7 +66,7 @@ def squared_distance_edge_edge(points: np.ndarray) -> list[Fraction]:
 
 
 def within_vertex_face(points: np.ndarray, distance: ArrayLike, threads: int = 0) -> np.ndarray:
-    """Whether (Q,) points (Q,4,3), rows v f0 f1 f2, are at most the distance apart (one, or (Q,) of them)."""
+    """Whether (Q,) points (Q,4,3), rows v f0 f1 f2, are at most the distance apart (scalar or (Q,))."""
     checked = _checked("points", points, 4)
     return _oracle.within_vertex_face(checked, _distances(distance, len(checked)), threads)
 

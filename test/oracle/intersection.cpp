@@ -26,8 +26,8 @@ bool pierces(const std::array<std::array<double, 3>, 5>& q) {
 
 }  // namespace
 
-// A common point is an end of the edge, or on the face's border, or inside both. In the last case the edge pierces the
-// face, or it lies in its plane and has an end in the face or goes on to the border.
+// A common point is an end of the edge, or on the face's border, or inside both. In the last case the edge passes
+// through the face, or it lies in its plane and has an end in the face or continues to the border.
 bool edge_face_intersect(const std::array<std::array<double, 3>, 5>& q) {
   const auto& [p0, p1, a, b, c] = q;
   return within_vertex_face({p0, a, b, c}, 0.0) || within_vertex_face({p1, a, b, c}, 0.0) ||

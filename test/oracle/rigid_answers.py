@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the detector says about random queries by way of hpccd_core.rigid, beside the truth."""
+"""Results of the detector for random queries through hpccd_core.rigid, compared with the truth."""
 
 from __future__ import annotations
 
@@ -54,11 +54,11 @@ def ask(queries: Queries) -> Answers:
 class Verdict:
     """Counts of queries.
 
-    ``missed``: reported free, and proven to come within the distance. ``late``: reported later than that.
-    ``beyond``: at the time that is reported farther apart than the distance and twice the bound.
+    ``missed``: false negatives, proven to come within the distance. ``late``: reported too late.
+    ``beyond``: at the reported time, farther apart than the distance plus twice the bound.
     ``open``: reported free, or in time, and not proven either way.
-    ``excess``: reported, and proven not to come within the distance.
-    ``worst_excess``: the greatest distance at the time that is reported less that asked for, over the bound.
+    ``excess``: false positives, proven not to come within the distance.
+    ``worst_excess``: the largest distance at the reported time minus the requested one, divided by the bound.
     """
 
     queries: int

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Points that go with a rigid mesh or with a link, as mathematics has it: many queries at once, in any precision.
+"""Points of a rigid mesh or a link: many queries at once, in any precision.
 
-It shares no formula with hpccd_core.rigid. A screw is the exponential of its twist here; a link goes by products of
-matrices. `kind` is np.float64, or np.longdouble for what that leaves open.
+It shares no formula with hpccd_core.rigid: a screw is the exponential of its twist, a link a product of matrices.
+`kind` is np.float64, or np.longdouble for queries that float64 leaves open.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Paths(Protocol):
 class ScrewPaths:
     """points (Q,n,3) in the body; quaternions (Q,2,4), x y z w, of any length; shifts (Q,2,3); origins (Q,3).
 
-    What comes out is less the origin, so that what is far away loses nothing.
+    Results are relative to the origin, so points far away lose no precision.
     """
 
     points: np.ndarray

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random pairs of features that move by screws and joints: from turns that hardly are any to half turns, near the
-origin and far away, most of them shifted so that they just touch, or just do not."""
+"""Random pairs of features that move by screws and joints: rotations from almost none to half a turn, near the origin
+and far away, most of them shifted so that they just touch or just do not."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def random_queries(rng: np.random.Generator, n: int, kind: str, motion: str) -> 
 
 
 def random_paths(rng: np.random.Generator, n: int, corners: int, size: np.ndarray, motion: str) -> Paths:
-    """Of n times so many points within a body of this size (n,)."""
+    """Paths of n sets of points within bodies of this size (n,)."""
     return _screws(rng, n, corners, size) if motion == "screws" else _links(rng, n, corners, size)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far vertices really are from their straight lines, over the bound on it."""
+"""The true distance of vertices from their straight lines, divided by its bound."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether two features on their true paths come within a distance: proven, either way, by branch and bound over time.
 
-An interval of time of half width w about m. The features come as near as at m: the distance there of two points of
-theirs. And with any direction n, n.(a - b) of vertices a and b stays above its value at m, less its rate times w, less
-(A_a + A_b) w**2 / 2, where A bounds accelerations: the least over all pairs of vertices is below the distance of the
-features throughout. The direction is that of the nearest points at m, whose rate vanishes where the distance is least,
-so that few intervals are needed however near the distance is to the one asked about.
+Consider an interval of time of half width w around m. An upper bound of the smallest distance is the distance of two
+points at m. For a lower bound, take any direction n: n.(a - b) of vertices a and b stays above its value at m, minus
+its rate times w, minus (A_a + A_b) w**2 / 2, where A bounds accelerations; the minimum over all pairs of vertices
+bounds the distance of the features from below. n is the direction of the nearest points at m: its rate vanishes at the
+smallest distance, so few intervals are needed even if the distance is close to the requested one.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class Pairs:
 
 
 def comes_within(pairs: Pairs, distance: np.ndarray, until: np.ndarray | None = None, rows: np.ndarray | None = None):
-    """(N,) of WITHIN, BEYOND, OPEN: whether the features of these queries (all by default) come within so much of each
-    other at a time in [0, until]. In double precision first, what that leaves open with 64 bits."""
+    """(N,) of WITHIN, BEYOND, OPEN: whether the features of these queries (all by default) come within the distance at
+    a time in [0, until]. In double precision first; open ones with 64 bits."""
     rows = np.arange(len(distance)) if rows is None else rows
     found = _decided(pairs, rows, distance, until, np.float64)
     if (still := found == OPEN).any() and np.finfo(np.longdouble).eps < 1e-18:

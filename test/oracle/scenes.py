@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All answers of a scene, by the exact tests on every pair whose boxes do not rule it out.
+"""All results of a scene, by exact tests of every pair whose boxes overlap.
 
 Arguments of all: faces_per_mesh: for each mesh (F,3) integers, indices into its own vertices. n_vertices: for each
 mesh, by default one more than its largest index. edges_per_mesh: for each mesh (E,2) integers, likewise: edges beside
 those of its faces. Not tested: features that share a vertex, meshes in
 `no_self_collision` against themselves, `static` ones against themselves and each other, and `ignored_pairs` (all by
 position in faces_per_mesh). Vertices that belong to no face are tested against faces too; an edge from a vertex to
-itself is none. Positions are (V,3), finite, all meshes' vertices one after the other. Raise ValueError where shapes or
-counts do not fit together. threads: 0 = all cores.
+itself is none. Positions are (V,3), finite, all meshes' vertices one after the other. Raise ValueError if shapes or
+counts do not match. threads: 0 = all cores.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def proximity(
 def intersections(
     vertices: np.ndarray, faces_per_mesh: Sequence[np.ndarray], *, threads: int = 0, **scene: Any
 ) -> np.ndarray:
-    """Edges that pierce or touch faces: (K,3) uint32, a0<a1, face, sorted lexicographically."""
+    """Edges that intersect or touch faces: (K,3) uint32, a0<a1, face, sorted lexicographically."""
     parts = _Scene(faces_per_mesh, **scene)
     return _oracle.intersections(parts.meshes, parts.positions("vertices", vertices), threads)
 
