@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What tests of several folders share. Imports are late: the tests of the core need neither ROS nor this package's."""
+"""Fixtures of several folders. Imports are late: the tests of the core need neither ROS nor its packages."""
 
 import itertools
 import os

@@ -33,12 +33,12 @@ from sources import SOURCES
 
 from hpccd_ros.picture import view
 
-# Seconds for one case, on a machine that is ten times too busy; the slowest takes three alone.
+# Seconds for one case on an overloaded machine; the slowest takes three on an idle one.
 PATIENCE = 120
-# Memory that a case may take beyond what the process has anyway, MB; the bomb of hostile.py unpacks to 268.
+# Memory that a case may use in addition, MB; the bomb of hostile.py unpacks to 268.
 MEMORY = 900
 BASES = ("streams", "everything")
-# Kinds of cases that are played over DDS too: topics, types and bytes are all that is used for it.
+# Kinds of cases that are also published over DDS, which uses only topics, types and bytes.
 PLAYED = {
     "metadata_of_a_topic",
     "topic_name",
@@ -175,7 +175,7 @@ def _lies(path, row, steps, told) -> list[str]:
 
 
 def _memory(reset=False) -> int:
-    """The most that this process had since the last reset, MB."""
+    """Peak memory of this process since the last reset, MB."""
     if reset:
         Path("/proc/self/clear_refs").write_text("5")
     status = Path("/proc/self/status").read_text()
@@ -186,7 +186,7 @@ def _memory(reset=False) -> int:
 
 
 class Worker:
-    """A process that runs cases; a new one where it is lost."""
+    """A process that runs cases; it is replaced if it crashes."""
 
     def __init__(self, folder: Path):
         self._folder = folder
@@ -227,7 +227,7 @@ class Worker:
 
 
 def attack(names, folder: Path, on_result=lambda result: None) -> list[dict]:
-    """Run all cases; the results that have problems."""
+    """Run all cases; return the results with problems."""
     worker = Worker(folder)
     bad = []
     try:

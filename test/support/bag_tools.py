@@ -16,7 +16,7 @@ STRING = "std_msgs/msg/String"
 
 
 def typestore():
-    """rosbags' own knowledge of the messages of this package, from the text of the .msg files."""
+    """A typestore of rosbags with the messages of this package, from the text of the .msg files."""
     store = get_typestore(Stores.ROS2_JAZZY)
     for name in ("MeshTopology", "MeshVertices", "ContactArray", "DistanceArray"):
         text = message_definitions.definition_text(f"hpccd/msg/{name}").split(message_definitions.SEPARATOR)[0]
@@ -70,7 +70,7 @@ def rewrite(source, target, change=lambda index, message, decoded: decoded, info
             type_name = recording.topics[message.topic].type_name
             index = counts[message.topic] = counts.get(message.topic, -1) + 1
             decoded = store.deserialize_cdr(message.data, type_name)
-            # Not the same bytes: Fast CDR leaves what happens to be in memory between aligned fields.
+            # Bytes differ: Fast CDR does not initialise the padding between aligned fields.
             assert len(store.serialize_cdr(decoded, type_name)) == len(message.data)
             changed = change(index, message, decoded)
             if changed is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small sound recordings, verified by a replay, from which hostile ones are made."""
+"""Small valid recordings, verified by a replay; hostile ones are derived from them."""
 
 import numpy as np
 from bag_tools import typestore
@@ -40,7 +40,7 @@ def write_all(folder) -> None:
 
 
 def of_streams(source) -> Bag:
-    """Two meshes that come as MeshTopology and MeshVertices: some frames of the recording of the repository."""
+    """Two meshes as MeshTopology and MeshVertices: some frames of the recording of the repository."""
     bag = Bag.read(source)
     wanted = []
     for channel in bag.channels:
@@ -166,7 +166,7 @@ def _inputs(make):
 
 
 def _answers(path):
-    """What the node would have answered, as rosbags' messages: contacts and smallest distances of each step."""
+    """The results of a node as rosbags' messages: contacts and smallest distances of each step."""
     from hpccd.msg import ContactArray, DistanceArray
 
     store = typestore()

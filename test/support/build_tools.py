@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Run CMake, compilers and what they made, in tests of packages that are built and installed."""
+"""Run CMake, compilers and built programs in tests of installed packages."""
 
 import os
 import subprocess
@@ -11,7 +11,7 @@ ENVIRONMENT = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}
 
 
 def run(*command, environment=ENVIRONMENT) -> str:
-    """What it printed; a failure shows it."""
+    """The output; a failure shows it."""
     done = subprocess.run(
         [str(part) for part in command],
         text=True,

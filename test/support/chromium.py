@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A page in a headless Chromium, driven over a pipe by the DevTools protocol: no driver has to be installed."""
+"""A page in a headless Chromium, controlled over a pipe by the DevTools protocol, without a driver."""
 
 import base64
 import functools
@@ -33,7 +33,7 @@ OPTIONS = (
     "--force-device-scale-factor=1",
     "--hide-scrollbars",
 )
-# The protocol is spoken on descriptors 3 and 4; the pipes may have these numbers themselves, the other way round.
+# The protocol uses descriptors 3 and 4; the pipes may already have these numbers, in the other order.
 EXECUTE = """
 import fcntl, os, sys
 ends = [fcntl.fcntl(int(end), fcntl.F_DUPFD, 10) for end in sys.argv[1:3]]
@@ -46,8 +46,7 @@ os.execv(sys.argv[3], sys.argv[3:])
 
 @functools.cache
 def program() -> str | None:
-    """Path of a Chromium that runs, HPCCD_CHROMIUM if that is set. (Ubuntu's package is a program that only says where
-    to get one.)"""
+    """Path of a Chromium that runs; HPCCD_CHROMIUM if it is set. (Ubuntu's package only prints how to install it.)"""
     if named := os.environ.get("HPCCD_CHROMIUM"):
         return named
     for path in filter(None, map(shutil.which, NAMES)):
@@ -58,7 +57,7 @@ def program() -> str | None:
 
 
 def _environment():
-    """Without the libraries of the ROS wheels, which are not those that a system's programs were built with."""
+    """The environment without the libraries of the ROS wheels, which differ from those of the system."""
     return {name: value for name, value in os.environ.items() if name != "LD_LIBRARY_PATH"}
 
 
@@ -115,7 +114,7 @@ class Chromium:
         return result["result"].get("value")
 
     def wait(self, expression: str, timeout=120.0):
-        """The value of `expression`, as soon as it is true."""
+        """Wait until `expression` is true; its value."""
         end = time.monotonic() + timeout
         while not (value := self.evaluate(expression)):
             assert time.monotonic() < end, f"{expression} was not true within {timeout} s; console: {self.said}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small robot and what it moves by: a boom that turns and slides, a hook on it, mast and hook round."""
+"""A small robot and its motion: a boom that rotates and slides, with a hook; mast and hook are round."""
 
 import math
 

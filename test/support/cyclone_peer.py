@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A simulator without ROS: streams a mesh by Cyclone DDS and saves the contacts that come back.
+"""A simulator without ROS: publishes a mesh with Cyclone DDS and saves the contacts that it receives.
 
 `python cyclone_peer.py NAMESPACE INPUT OUTPUT`. INPUT: .npz with faces (F,3) and frames (K,V,3), float32 or float64.
-OUTPUT: .json with the answers, each a dictionary of the message's fields.
+OUTPUT: .json with the results, each a dictionary of the message's fields.
 """
 
 import dataclasses

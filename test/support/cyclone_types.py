@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The package's messages as Cyclone DDS takes them, written by hand from the .msg files: no ROS has a part in them."""
+"""The package's messages for Cyclone DDS, written by hand from the .msg files, without code of ROS."""
 
 from dataclasses import dataclass
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random damage to the bytes of a file: what disks, cables and careless copies do to recordings."""
+"""Random damage to the bytes of a file, as disks, cables and interrupted copies cause it."""
 
 import struct
 
@@ -52,7 +52,7 @@ def repeat_a_piece(rng, data):
 
 
 def reorder_records(rng, data):
-    """The same records in another order, as of a file put together of parts."""
+    """The same records in another order, as in a file joined from parts."""
     records = whole_records(data)
     a, b = sorted(rng.sample(range(len(records)), 2))
     records[a], records[b] = records[b], records[a]
@@ -66,7 +66,7 @@ def lose_a_record(rng, data):
 
 
 def large_number(rng, data):
-    """A length or place becomes huge."""
+    """A length or an offset becomes huge."""
     at = rng.randrange(len(data) - 8)
     data[at : at + 8] = struct.pack("<Q", rng.choice((0, 2**31, 2**32 - 1, 2**40, 2**63, 2**64 - 1)))
 

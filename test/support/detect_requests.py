@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Requests to ~/detect, good and bad, of waving sheets."""
+"""Valid and invalid requests to ~/detect, with waving sheets."""
 
 import math
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The node with faults of our own making, of a kind that no code of it expects: a program for test_guard.py."""
+"""The node with injected faults that its code does not expect: a program for test_guard.py."""
 
 import sys
 

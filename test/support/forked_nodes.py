@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Many starts of the node at little cost: one process has loaded everything, each start is a fork of it.
+"""Many fast starts of the node: one process has loaded all modules, and each start is a fork of it.
 
 Reads {name: [arguments]} as JSON from stdin, writes {name: [exit status, output]} as JSON. A node that becomes active
-is told to end.
+is stopped.
 """
 
 import json

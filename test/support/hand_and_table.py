@@ -9,5 +9,5 @@ TABLE = np.array([[-9.0, -9, 0], [9, -9, 0], [0, 9, 0]])
 
 
 def hand(height: float) -> np.ndarray:
-    """The positions whose lowest vertex is so high above the middle of the table."""
+    """Positions of the hand with its lowest vertex at this height above the middle of the table."""
     return np.array([[0, 0, height], [1, 0, height + 1], [0, 1, height + 1]])

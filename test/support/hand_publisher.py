@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A mesh source to be killed: the hand high above the table, a frame each 50 ms. Its argument is the namespace."""
+"""A mesh publisher for tests that kill it: the hand high above the table, a frame every 50 ms. Argument: namespace."""
 
 import itertools
 import sys

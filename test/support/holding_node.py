@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node with faults in its threads, for test_stop_fails_safe.py.
 
-In the step that ends at stamp RAISES its detection raises what nobody expects, at HANGS it hangs for HELD seconds; so
-does its executor after a change of markers_max.
+In the step that ends at stamp RAISES its detection raises an unexpected exception; at HANGS it hangs for HELD seconds,
+and so does its executor after a change of markers_max.
 """
 
 import sys

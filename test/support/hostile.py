@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hostile recordings: files with right check sums that say something no recorder would write."""
+"""Hostile recordings: files with valid checksums and content that no recorder writes."""
 
 import hostile_container  # noqa: F401
 import hostile_mesh_files  # noqa: F401

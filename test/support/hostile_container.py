@@ -36,7 +36,7 @@ BOMB = 1 << 28
 
 @kind
 def bomb(rng, bag):
-    """A chunk that unpacks to much more than it says, or says that it unpacks to more than there is memory."""
+    """A chunk that unpacks to more than its header says, or whose header says more than there is memory."""
     compression = rng.choice(("zstd", "lz4"))
     data = zeros(compression, BOMB)
     says = rng.choice((0, 1000, BOMB, 2**33, 2**63, 2**64 - 1))
@@ -72,7 +72,7 @@ def chunk_lies(rng, bag):
 
 @kind
 def chunk_without_check_sum(rng, bag):
-    """What is flipped in it, nobody notices but by what it says."""
+    """Flipped bytes in a chunk without a checksum: only the content can reveal them."""
 
     def change(chunk):
         if chunk.compression:
@@ -124,7 +124,7 @@ def records_inside_a_chunk(rng, bag):
 
 @kind
 def many_records(rng, bag):
-    """A great many of the smallest records: each costs a reader more than its bytes."""
+    """Very many of the smallest records: each costs a reader more than its bytes."""
     strange = rng.choice(
         (
             raw_record(0x7F, b"") * 300_000,
@@ -224,7 +224,7 @@ def index_lies(rng, bag):
 
 @kind
 def index_of_other_topics(rng, bag):
-    """The index tells other topics, types or numbers than the data."""
+    """The index has other topics, types or numbers than the data."""
 
     def change(records):
         out = [dataclasses.replace(record) for record in records]

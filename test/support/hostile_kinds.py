@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the kinds of hostile recordings share, and their names.
+"""Shared code of the kinds of hostile recordings, and their names.
 
 Each kind is a function of a random generator and a `Bag`, in which it changes one thing.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mesh files that travel along."""
+"""Hostile mesh files stored in a recording."""
 
 import dataclasses
 import struct
@@ -10,7 +10,7 @@ from mcap_model import as_bytes
 
 
 def ply(form, n_vertices, n_faces) -> bytes:
-    """The header of a file that claims to be so large."""
+    """The header of a file that claims this size."""
     lines = [
         "ply",
         f"format {form} 1.0",

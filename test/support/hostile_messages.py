@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Contents, order and times of messages."""
+"""Hostile content, order and times of messages."""
 
 import math
 import struct
@@ -105,7 +105,7 @@ def changed_answer(rng, bag):
 
 @kind
 def changed_separation(rng, bag):
-    """Other margins than those with which the contacts were found, or none that can be."""
+    """Other separations than those used for the contacts, or invalid ones."""
 
     def change(put, answer):
         name = rng.choice(("minimum_separation", "separation_mesh_a", "separation_mesh_b", "separations", "all"))
@@ -127,7 +127,7 @@ def changed_separation(rng, bag):
 
 @kind
 def changed_distances(rng, bag):
-    """Of bags that tell any; of others the contacts are of no mesh that there is."""
+    """Changed distances, if the recording has any; otherwise contacts of meshes that do not exist."""
 
     def change(put, answer):
         name = rng.choice(("kind", "mesh_a", "mesh_b", "features_a", "features_b", "distance", "points"))
@@ -146,7 +146,7 @@ def changed_distances(rng, bag):
 
 @kind
 def contact_under_another_name(rng, bag):
-    """A contact whose mesh and feature are others that add up to the same number in the scene."""
+    """A contact with another mesh and feature that have the same scene-wide index."""
     store, name = typestore(), "hpccd/msg/MeshTopology"
     topology = bag.of_topic(f"/meshes/{info_of(bag)['parameters']['meshes'][0]}/topology")[0]
     first = store.deserialize_cdr(topology.data, name).n_vertices

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the recorder stored of the node: parameters, topics, roles."""
+"""Hostile set-up of the node in a recording: parameters, topics, roles."""
 
 import json
 import math
@@ -9,7 +9,7 @@ from mcap.records import Metadata
 
 
 def junk(rng):
-    """Any value that JSON can hold."""
+    """A random value of JSON."""
     deep = []
     for _ in range(rng.choice((3, 400))):
         deep = [deep] if rng.random() < 0.5 else {"a": deep}
@@ -268,7 +268,7 @@ def another_pose(rng, bag):
 
 @kind
 def another_question(rng, bag):
-    """Options that the contacts depend on, or how they are compared."""
+    """Other options that affect contacts, or how they are compared."""
     info = info_of(bag)
     name, values = rng.choice(
         (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Types, topics and channels."""
+"""Hostile types, topics and channels."""
 
 import dataclasses
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Run `hpccd` commands in this process: a start of Python costs more than most of what the tests ask of them."""
+"""Run `hpccd` commands in this process: starting Python takes longer than most of the commands in tests."""
 
 import contextlib
 import io
@@ -10,7 +10,7 @@ from hpccd_ros import cli
 
 
 class Done(NamedTuple):
-    """traceback: of what no user should see, or ""."""
+    """traceback: of an unexpected exception, or ""."""
 
     status: int | None
     out: str

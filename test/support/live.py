@@ -7,9 +7,9 @@ from hpccd_ros import scenes
 from hpccd_ros.bag.examine import examine
 from hpccd_ros.scenes import files
 
-# Long enough for a machine that is ten times too busy; reached only by tests that fail.
+# Long enough for an overloaded machine; only failing tests reach it.
 PATIENCE = 240.0
-# What the processes wait for each other, s.
+# How long the processes wait for each other, s.
 WAIT = str(PATIENCE)
 
 
@@ -26,7 +26,7 @@ class Live:
         files.write_parameters(scenes.make(scene, size=size, frames=frames), self.parameters)
 
     def node(self, *parameters: str):
-        # Queues that hold the whole scene: these tests are not about what a loaded machine drops.
+        # Queues that hold the whole scene, so that a loaded machine drops nothing.
         parameters = ("frame_queue:=1000", "input_depth:=1000", *parameters)
         extra = [word for parameter in parameters for word in ("-p", parameter)]
         child = self._children.start(
@@ -73,9 +73,9 @@ class Live:
         )
 
     def wait_for_answers(self, path, count: int):
-        """Wait until so many contact messages are flushed to the recording `path`, a file or a folder of files.
+        """Wait until `count` contact messages are flushed to the recording `path`, a file or a folder of files.
 
-        The publisher ends when all it sent was acknowledged; the last answers may still be computed then.
+        The publisher ends when its messages are acknowledged; the node may still compute the last results then.
         """
         files = lambda: sorted(path.glob("*.mcap")) if path.is_dir() else [path]  # noqa: E731
         recorded = lambda: sum(  # noqa: E731
@@ -90,18 +90,18 @@ class Live:
         )
 
     def kill(self, child):
-        """SIGKILL, and forget it: its end is no error."""
+        """SIGKILL; this end is not an error."""
         child.process.kill()
         child.process.wait()
         self._children.forget(child)
 
     def wait_for(self, child):
-        """Wait until a process has ended by itself, without an error."""
+        """Wait until a process has ended without an error."""
         self._children.wait(lambda: not child.running, f"the {child.name} did not end", PATIENCE)
         self._children.check()
 
     def end(self, child) -> str:
-        """End a process with SIGINT; its output. Fails where it did not end well."""
+        """End a process with SIGINT; returns its output. Fails if its exit status is not 0."""
         status = self._children.end(child)
         assert status == 0, f"{child.name} ended with {status}:\n{child.last_words()}"
         return child.last_words()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A step whose detection takes far longer than it takes to end it, and how long it takes at least."""
+"""A step whose detection takes much longer than its cancellation, and a lower bound of its duration."""
 
 import threading
 import time
@@ -27,7 +27,7 @@ def long_request(meshes=MESHES):
 
 
 def step_needs_more_than(seconds):
-    """Whether the step, computed here, is still under way after so many seconds of a core."""
+    """Whether the step, computed here, is still running after this CPU time in seconds."""
     scene = scene_of(**{mesh: sheet_faces(N) for mesh in MESHES})
     detector = hc.Detector(scene, threads=1, accuracy="exact")
     given_up = []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A recording as the records it is made of, written with right check sums whatever they say: for hostile files."""
+"""A recording as a list of records, written with valid checksums whatever the content: for hostile files."""
 
 import dataclasses
 import struct
@@ -40,7 +40,7 @@ def unchanged(thing):
 
 @dataclasses.dataclass
 class Bag:
-    """Records by kind. The functions may change or replace what is written; raw bytes stand for themselves.
+    """Records by kind. Tests may change or replace them; bytes are written as they are.
 
     chunk: each Chunk, with its data compressed. data: all records of the data section, chunks as records or bytes.
     index: those of the summary. footer: the Footer, before its check sum is made. end: all bytes of the file.
@@ -76,7 +76,7 @@ class Bag:
         return cls(found[Schema], found[Channel], found[Message], found[Metadata], found[Attachment])
 
     def copy(self) -> "Bag":
-        """Whose records can be changed without changing this one's."""
+        """A copy whose records can be changed without changing this one's."""
         changed = {
             name: [dataclasses.replace(record) for record in getattr(self, name)]
             for name in ("schemas", "channels", "messages", "metadata", "attachments")
@@ -209,5 +209,5 @@ def as_bytes(record) -> bytes:
 
 
 def raw_record(opcode: int, body: bytes, length: int | None = None) -> bytes:
-    """A record of any kind; `length`: what it claims instead of its own."""
+    """A record of any kind; `length`: a false length for its header."""
     return struct.pack("<BQ", opcode, len(body) if length is None else length) + body

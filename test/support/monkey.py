@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random calls of everything that a node can be asked, sensible and hostile; the same ones for the same seed."""
+"""Random calls of all interfaces of a node, valid and hostile; the same calls for the same seed."""
 
 import importlib
 import math
@@ -18,7 +18,7 @@ from waving_sheet import sheet_faces, sheet_positions
 from hpccd_ros.middleware import mesh_messages
 from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS, Row
 
-# Ends the node's life for good: asked of it last.
+# This transition ends the node's life cycle, so it is requested last.
 SHUTDOWN = {
     Transition.TRANSITION_UNCONFIGURED_SHUTDOWN,
     Transition.TRANSITION_INACTIVE_SHUTDOWN,
@@ -37,7 +37,7 @@ LABELS = ("configure", "activate", "deactivate", "cleanup", "create", "destroy",
 
 
 class Monkey:
-    """folder: where recordings and mesh files may lie; meshes: of the node; n: their sheets have n * n vertices."""
+    """folder: for recordings and mesh files; meshes: of the node; n: their sheets have n * n vertices."""
 
     def __init__(self, seed: int, folder: Path, meshes: list[str], n: int) -> None:
         self.random = random.Random(seed)
@@ -153,7 +153,7 @@ class Monkey:
         return request
 
     def spoil(self, message: MeshVertices) -> MeshVertices:
-        """Make the message one that must be refused, mostly."""
+        """Make the message invalid in most cases."""
         field = "vertices_f32" if message.vertices_f32 else "vertices_f64"
         values = getattr(message, field)
         kind = self.random.randrange(6)

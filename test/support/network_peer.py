@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A simulator on another machine, as far as the network can tell: streams a mesh until an answer comes.
+"""A simulator in another network namespace: publishes a mesh until a result arrives.
 
 `python network_peer.py NAMESPACE SECONDS`; prints JSON: {"answer": {"start", "step", "hash", "total"} or null,
 "listeners"}; start, step: numbers of the two frames.

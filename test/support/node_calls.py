@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Services of a NodeProcess as functions, and a stream of frames that it answers."""
+"""Services of a NodeProcess as functions, and a stream of frames with its results."""
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Start the node as a plain process and talk to it over DDS from this one."""
+"""Start the node as a process and communicate with it over DDS from this one."""
 
 import itertools
 import os
@@ -28,9 +28,9 @@ import hpccd_ros
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.middleware import contact_messages, environment, fields, mesh_messages, qos
 
-# Long enough for a machine that is ten times too busy; reached only by tests that fail.
+# Long enough for an overloaded machine; only failing tests reach it.
 PATIENCE = 240.0
-# Seconds for a node to end by itself when a test is over.
+# Seconds for a node to exit at the end of a test.
 ORDERLY = 20.0
 MODULE = ("-m", "hpccd_ros.node")
 
@@ -40,9 +40,9 @@ _numbers = itertools.count()
 class NodeProcess:
     """``python -m hpccd_ros.node`` in a namespace of its own, and a peer in this process.
 
-    parameters: nested as in YAML, meshes included; NAMESPACE in them stands for that of the node. profiles: parameter
-    files, read after the parameters. remaps: further ``from:=to`` rules. program: arguments of a Python started for it,
-    MODULE for the node itself; by default the node is a fork of node_server.py.
+    parameters: nested as in YAML, including meshes; NAMESPACE in them is replaced by that of the node. profiles:
+    parameter files, read after the parameters. remaps: additional ``from:=to`` rules. program: arguments of a new
+    Python process, MODULE for the node itself; by default the node is a fork of node_server.py.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class NodeProcess:
         return value
 
     def contacts(self, count: int) -> list[ContactArray]:
-        """Wait for ``count`` messages in all."""
+        """Wait until ``count`` messages have arrived."""
         self.wait_until(lambda: len(self.peer.received) >= count, f"{count} contact messages")
         return self.peer.received
 
@@ -134,7 +134,7 @@ class NodeProcess:
 
 
 class Peer:
-    """A node in this process, in a context of its own: publishes meshes, reads contacts and diagnostics."""
+    """A node in this process with its own context: publishes meshes, receives contacts and diagnostics."""
 
     def __init__(self, namespace: str):
         environment.prepare()
@@ -159,7 +159,7 @@ class Peer:
             self.statuses[status.name.rpartition(": ")[2]] = (status.level, status.message, values)
 
     def publisher(self, kind: type, topic: str, profile: QoSProfile | None = None) -> Any:
-        """A publisher that the node, and who else is to hear it (``readers`` in all), are known to listen to."""
+        """A publisher that the node and other subscribers (``readers`` in total) are matched with."""
         if topic not in self._publishers:
             self._publishers[topic] = self.node.create_publisher(kind, topic, profile or qos.vertices("reliable", 100))
             self.await_readers(topic)
@@ -178,7 +178,7 @@ class Peer:
     def topology(self, mesh: str, faces: np.ndarray, n_vertices: int, version: int = 0, **edges: np.ndarray) -> None:
         publisher = self.publisher(MeshTopology, f"meshes/{mesh}/topology", qos.TOPOLOGY)
         publisher.publish(mesh_messages.topology_message(faces, n_vertices, version=version, **edges))
-        # Nothing orders two topics: vertices that follow must not overtake it.
+        # Topics are not ordered: vertices sent next must not overtake it.
         assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
 
     def vertices(self, mesh: str, vertices: np.ndarray, stamp: int, **fields: Any) -> None:
@@ -186,7 +186,7 @@ class Peer:
         publisher.publish(mesh_messages.vertices_message(vertices, stamp, **fields))
 
     def client(self, depth: int = 10) -> Any:
-        """A client of ~/detect that is connected. depth: requests, and answers, that it holds at once."""
+        """A connected client of ~/detect. depth: of its queues of requests and responses."""
         profile = QoSProfile(depth=depth, history=HistoryPolicy.KEEP_LAST)
         client = self.node.create_client(Detect, "hpccd/detect", qos_profile=profile)
         assert client.wait_for_service(timeout_sec=PATIENCE)
@@ -199,7 +199,7 @@ class Peer:
 
 
 def assert_same_contacts(message: ContactArray, t0: np.ndarray, t1: np.ndarray, scene: hc.Scene, **options: Any) -> int:
-    """Contacts equal those of the core called directly on the same positions; their number."""
+    """Assert that contacts equal those of the core on the same positions; returns their number."""
     expected = hc.Detector(scene, **options).detect(t0, t1)
     names = tuple(message.mesh_names)
     vertex_offsets = [scene.vertex_offset(name) for name in names] + [scene.n_vertices]

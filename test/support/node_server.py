@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Starts nodes as forks of one process that has loaded everything: 0.3 s of a core each, in place of 0.9.
+"""Start nodes as forks of one process that has loaded all modules: 0.3 s of CPU time each instead of 0.9.
 
-As a program: reads a JSON object a line from stdin ({"arguments", "output", "environment"}), writes the process id of
-the node, and its status to the file OUTPUT.status when it has ended. Python's finalization is left out: a fork crashes
-in the static destructors of DDS. Tests of how a node begins and ends start a Python of its own.
+As a program: reads one JSON object per line from stdin ({"arguments", "output", "environment"}), writes the process id
+of the node, and its status to the file OUTPUT.status when it has ended. Python's finalization is skipped, because a
+fork crashes in the static destructors of DDS. Tests of start and exit use a new Python process.
 """
 
 import atexit
@@ -26,7 +26,7 @@ ENDING = {signal.SIGINT, signal.SIGTERM}
 
 
 class ForkedNode:
-    """A node's process, with those methods of subprocess.Popen that tests use."""
+    """A node's process, with the methods of subprocess.Popen that tests use."""
 
     returncode: int | None = None
 
@@ -85,7 +85,7 @@ def _ask(request: str) -> str:
 
 
 def _serve() -> dict | None:
-    """The request of which this process is the node; None at the end of the input."""
+    """The request that this process serves as the node; None at the end of the input."""
     waiting: dict[int, Path] = {}
     wake, woken = os.pipe()
     os.set_blocking(woken, False)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an HTML page of a recording holds, read without the code that wrote it."""
+"""The content of an HTML page of a recording, read without the code that wrote it."""
 
 import base64
 import json
@@ -41,7 +41,7 @@ class Page(HTMLParser):
             self._open = None
 
     def integers(self, name, size, shape) -> np.ndarray:
-        """What `packed` made of an array of `shape` with integers of `size` bytes."""
+        """The array of `shape` that `packed` wrote with integers of `size` bytes."""
         planes = np.frombuffer(zlib.decompress(base64.b64decode(self.texts[name])), np.uint8).reshape(size, -1)
         folded = sum(plane.astype(np.int64) << 8 * k for k, plane in enumerate(planes)).reshape(shape)
         differences = np.where(folded % 2, -(folded + 1) // 2, folded // 2)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What comes of a pipeline, put together."""
+"""Joined outcomes of a pipeline."""
 
 from hpccd_ros.frames.types import Outcome
 

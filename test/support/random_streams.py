@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random streams to a node that records itself, in which answers depend on the order of messages of several topics:
-shapes and static meshes sent again, a base that transforms move beside joint states, restarts with equal stamps."""
+"""Random streams to a node that records itself. Results depend on the order of messages of several topics: shapes and
+static meshes sent again, a base moved by transforms besides joint states, restarts with equal stamps."""
 
 import random
 
@@ -52,7 +52,7 @@ def parameters(rng: random.Random, scene, record) -> dict:
 
 
 class RandomStream:
-    """A node of the scene that the seed chooses. ``recordings``: paths so far; `record` adds one."""
+    """A node with a random scene of this seed. ``recordings``: paths so far; `record` adds one."""
 
     def __init__(self, start_node, folder, seed: int) -> None:
         self._rng = rng = random.Random(seed)
@@ -65,7 +65,7 @@ class RandomStream:
         self._open()
 
     def record(self, ticks: int) -> None:
-        """A number of ticks of the stream into the recording that was begun last."""
+        """Send this number of ticks of the stream, into the current recording."""
         for tick in range(ticks):
             if self._rng.random() < 0.03 or self._k >= 70:
                 self._k = self._rng.choice((0, 0, max(0, self._k - 20)))  # a restart; by more and less than a second
@@ -105,7 +105,7 @@ class RandomStream:
         assert self._node.stop() == 0, self._node.output()
 
     def _open(self) -> None:
-        """Publishers with readers, so that what comes first reaches node and recording."""
+        """Publishers with readers, so that the first messages reach node and recording."""
         peer, scene = self._peer, self._scene
         self._topics = []
         for name in scene:
@@ -142,7 +142,7 @@ class RandomStream:
             self._peer.executor.spin_once(timeout_sec=0.005)
 
     def _tick(self) -> None:
-        """Messages that may be sent between two frames, in any order."""
+        """Random messages between two frames, in any order."""
         self._k += 1
         often = {"cloth": 0.95, "pose": 0.95, "tool": 0.4, "table": 0.3, "joints": 0.9, "base": 0.7, "topology": 0.03}
         kinds = [kind for kind, share in often.items() if self._rng.random() < share]
@@ -181,7 +181,7 @@ class RandomStream:
 
 
 def verified(path) -> int:
-    """How many answers of a recording are; fails where one is not."""
+    """The number of verified results of a recording; fails if one is not verified."""
     with Recording(path) as recording:
         replay = Replay(recording, recorded_setup.of_recording(recording))
         steps = list(replay.steps())

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether the answers in a recording are true: read by the MCAP library from begin to end, whatever its index says,
-decoded by rosbags, computed by the core from the positions beside them."""
+"""Check the results in a recording: it is read by the MCAP library from beginning to end without its index, decoded by
+rosbags, and recomputed by the core from the recorded positions."""
 
 import contextlib
 import itertools
@@ -26,7 +26,7 @@ FIELDS = ("kind", "mesh_a", "mesh_b", "features_a", "features_b", "toc")
 
 
 class Oracle:
-    """answers: all that the recording `path` holds."""
+    """answers: all results in the recording `path`."""
 
     def __init__(self, path):
         bag = Bag.read(path)
@@ -57,7 +57,7 @@ class Oracle:
         return [(answer.step, _ns(answer.start), _ns(answer.header.stamp)) for answer in self.answers]
 
     def untruths(self) -> list[str | None]:
-        """Of each answer, why it is not what its positions give; None where it is."""
+        """For each result, why it does not follow from its positions; None if it does."""
         return [self._untruth_of(answer) for answer in self.answers]
 
     def _of(self, mesh, name, otherwise):
@@ -74,7 +74,7 @@ class Oracle:
             pass  # refused by the node too
 
     def _positions(self, mesh, stamp):
-        """All that may have been in force: [(faces, n_vertices, positions)]."""
+        """All candidate states: [(faces, n_vertices, positions)]."""
         if name := self._of(mesh, "file", ""):
             with tempfile.TemporaryDirectory() as folder:
                 data = self.files[f"mesh/{mesh}/{Path(name).name}"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings of a node that takes messages in another order than its recorder, made without DDS."""
+"""Recordings of a node that receives messages in another order than its recorder, made without DDS."""
 
 import dataclasses
 from pathlib import Path
@@ -96,7 +96,7 @@ def _answers(found: Detection, inputs: TakenInputs, at: int, sent: int) -> list[
 
 
 def write(path: Path, parameters: dict, messages: list[Recorded]) -> Path:
-    """As a recording of the node with these parameters."""
+    """Write it as a recording of the node with these parameters."""
     path.unlink(missing_ok=True)
     kinds = {
         one.topic: f"{type(one.message).__module__.split('.')[0]}/msg/{type(one.message).__name__}" for one in messages

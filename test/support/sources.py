@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the tests and the processes that they start find the package."""
+"""Import paths of the package for the tests and the processes that they start."""
 
 import os
 from pathlib import Path

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The promise of `stop` as a model: from all messages sent and taken to whether it may be false. It knows nothing about
-how the node decides; times are true seconds, which no clock of the model shows."""
+"""A model of the promise of `stop`: decides from all sent and received messages whether `stop` may be false. It shares
+no code with the node; its times are true seconds, which no clock of the model shows."""
 
 import math
 from collections import defaultdict

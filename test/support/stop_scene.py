@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random approaches of a deforming ball to a deforming sheet, and by brute force which steps come near."""
+"""Random approaches of a deforming ball to a deforming sheet; brute force decides which steps come within the
+distance."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames of the hand above the table for a node with stop_distance, and what is heard on stop."""
+"""Frames of the hand above the table for a node with stop_distance, and the messages on stop."""
 
 import contextlib
 import threading
@@ -19,7 +19,7 @@ SHORT = 0.5
 
 
 class StopStream:
-    """Frames of the hand above the table, and all that was said on stop, heard in a thread of its own."""
+    """Publishes frames of the hand above the table, and receives stop in its own thread."""
 
     def __init__(self, node, timeout=TIMEOUT):
         self.node, self.sent = node, 0
@@ -68,7 +68,7 @@ class StopStream:
 
     @contextlib.contextmanager
     def steady(self, height=2.0, period=0.05):
-        """Meanwhile a frame is sent each so many seconds, by a thread of its own."""
+        """A context in which another thread sends a frame every `period` seconds."""
         ended = threading.Event()
 
         def send():

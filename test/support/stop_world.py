@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random sequences of events for a node with `stop` and the processes around it, compared with a model of its promise.
 
-The node's own classes run, from the callbacks of its subscriptions to the published `stop`; the test is their executor,
-their detection thread, DDS and clocks. Meshes move along z above a table, far beside each other.
+The classes of the node run, from the callbacks of its subscriptions to the published `stop`; the test replaces
+executor, detection thread, DDS and clocks. Meshes move along z above a table, far apart from each other.
 """
 
 import math
@@ -128,7 +128,7 @@ class World:
         self.promise.last = None
 
     def detect(self):
-        """The work of the detection thread on waiting frames."""
+        """The work of the detection thread on queued frames."""
         while self.queue.frames():
             item = self.queue.pop()
             if item.first:
@@ -143,7 +143,7 @@ class World:
         return dict(zip(self.scene.meshes, (xyz[:, 2].min() for xyz in frame.vertices), strict=True))
 
     def spin(self):
-        """Take what waits, topics in any order."""
+        """Take queued messages, topics in random order."""
         while waiting := [topic for topic, messages in self.inbox.items() if messages]:
             topic = waiting[self.rng.integers(len(waiting))]
             callback, message, info, taken = self.inbox[topic].popleft()
@@ -319,8 +319,8 @@ class World:
             ]
         )()
 
-    def mend(self):
-        """All inputs are sent again, and are valid."""
+    def resend(self):
+        """All inputs are sent again, valid."""
         for mesh in self.versions:
             self.topology(mesh)
         self.shape("tool"), self.shape("cart"), self.table()
@@ -329,7 +329,7 @@ class World:
         self.table()
 
     def refine(self):
-        """A new topology; positions of the table come with it, later, or not at all."""
+        """A new topology; positions of the table follow at once, later, or never."""
         mesh = self.any(self.versions)
         self.versions[mesh] += 1
         self.topology(mesh)
@@ -360,13 +360,13 @@ class World:
         self.ahead[self.any(PLACES)] = float(self.rng.choice([0.019, 0.015, 0.3, -0.3]))
 
     def describe(self):
-        """A description is rejected; later a valid one is in use."""
+        """A description is rejected; later a valid one arrives."""
         bad = self.rng.random() < 0.5
         self.promise.take("arm", "description", self.now, 0, math.nan if bad else 0.0)
         self.state.robots({"arm": "its description was rejected"} if bad else {})
 
     def remake(self):
-        """Another description of the robot is in use: the scene is made again."""
+        """Another description of the robot arrives: the scene is built again."""
         self.promise.take("arm", "description", self.now, 0, 0.0)
         self.state.robots({})
         self.state.end()
@@ -406,7 +406,7 @@ class World:
         "revive": 4,
         "refuse": 1.5,
         "refine": 0.5,
-        "mend": 6,
+        "resend": 6,
         "move_table": 1,
         "restart": 0.5,
         "jump": 0.4,

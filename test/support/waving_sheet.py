@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A folded sheet whose layers move through each other: contacts in every step, the same numbers at every run."""
+"""A folded sheet whose layers pass through each other: contacts in every step, the same numbers in every run."""
 
 import numpy as np
 

@@ -15,7 +15,7 @@ def shape_of(vertices, faces):
 
 
 def marker_of(vertices, faces, stamp=0, frame_id=""):
-    """Without sharing: each triangle has its three points."""
+    """Without shared vertices: each triangle has three points."""
     message = Marker(type=Marker.TRIANGLE_LIST, action=Marker.ADD, points=_points(vertices[faces.reshape(-1)]))
     message.header.stamp, message.header.frame_id = fields.ns_to_stamp(stamp), frame_id
     message.scale.x = message.scale.y = message.scale.z = 1.0
