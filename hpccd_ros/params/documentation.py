@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of the node's parameters, made from table.py.
+"""docs/parameters.md, generated from table.py.
 
 ``python -m hpccd_ros.params.documentation > docs/parameters.md``
 """
@@ -13,31 +13,32 @@ _HEAD = """\
 
 <!-- Made by `python -m hpccd_ros.params.documentation > docs/parameters.md`; a test compares. -->
 
-For those who configure `hpccd_node`. [config/hpccd.yaml](../config/hpccd.yaml) holds them all with their defaults. Copy
-it, put your meshes in, and start the node with it:
+[config/hpccd.yaml](../config/hpccd.yaml) contains all parameters with their defaults. Copy it, enter your meshes, and
+start the node with it:
 
 ```sh
 hpccd_node --ros-args --params-file my.yaml
 ```
 
-Or give one on the command line: `-p accuracy:=balanced`. Files for a purpose: [profiles](node.md#profiles).
-A value that is not allowed ends the start with one sentence (status 2). An unknown name is warned of.
+`-p accuracy:=balanced` on the command line sets one parameter. [Profiles](node.md#profiles) are parameter files for
+common purposes. With an invalid value the node does not start (exit status 2) and prints the reason.
+An unknown name is warned of.
 
 **When a parameter can change:**
 
-- *at run time*: at any moment, by the node's parameter services. A change that is refused says why.
-- *unconfigured*: it is read when the node is configured. Deactivate, clean up, set it, configure and activate again.
-- *start*: only given at the start.
+- *at run time*: at any time, through the node's parameter services. An invalid change is rejected with a reason.
+- *unconfigured*: while the node is unconfigured. Deactivate, clean up, set it, configure and activate again.
+- *start*: only at the start.
 
-An empty list of strings is written `[""]`: YAML parameters know no empty one. A text with colons is quoted, on the
-command line twice: `-p pair_separation:="['robot:cloth:0.01']"`. A float may be written without a point, and so may all
-numbers of a list: `[0, 0, 1, 0, 0, 0, 1]`. A list in which some have a point and some have none is refused by ROS.
+An empty list of strings is written `[""]`, because YAML parameters have no empty one. A string with colons is quoted,
+twice on the command line: `-p pair_separation:="['robot:cloth:0.01']"`. A float may be written without a decimal point,
+and so may all numbers of a list: `[0, 0, 1, 0, 0, 0, 1]`. ROS rejects a list that mixes both forms.
 """
 
 _QUALITY_OF_SERVICE = """\
 ## Quality of service
 
-Every topic may be given another QoS, by its whole name, namespace included:
+These parameters change the QoS of a topic, given by its full name with the namespace:
 
 | parameter | type | allowed | can change |
 |---|---|---|---|
@@ -45,20 +46,20 @@ Every topic may be given another QoS, by its whole name, namespace included:
 | `qos_overrides.TOPIC.KIND.depth` | int | 1 .. {deepest:,} | start |
 | `qos_overrides.TOPIC.KIND.reliability` | string | `reliable`, `best_effort` | start |
 
-KIND is `publisher` for what the node publishes, `subscription` for what it listens to.
-For example `qos_overrides./contacts.publisher.reliability: best_effort`, or
-`qos_overrides./meshes/cloth/vertices.subscription.depth: 50`. The node's own recording asks as the node does.
+KIND is `publisher` for outputs and `subscription` for inputs, for example
+`qos_overrides./contacts.publisher.reliability: best_effort` or
+`qos_overrides./meshes/cloth/vertices.subscription.depth: 50`. The node's own recording uses the same QoS.
 """
 
 _CHANGE = {ALWAYS: "at run time", UNCONFIGURED: "unconfigured", NEVER: "start"}
 
 
 def page() -> str:
-    """The whole page in Markdown."""
+    """The page in Markdown."""
     groups = [(heading, "", rows) for heading, rows in NODE_GROUPS.items()]
-    groups.append(("Of each mesh NAME in `meshes`", "mesh.NAME.", MESH_ROWS))
-    groups.append(("Of each robot NAME in `robots`", "robot.NAME.", ROBOT_ROWS))
-    groups.append(("Of pairs of meshes, each with a NAME of your choice", "pairs.NAME.", PAIR_ROWS))
+    groups.append(("Meshes: each NAME in `meshes`", "mesh.NAME.", MESH_ROWS))
+    groups.append(("Robots: each NAME in `robots`", "robot.NAME.", ROBOT_ROWS))
+    groups.append(("Pairs of meshes: each with a NAME of your choice", "pairs.NAME.", PAIR_ROWS))
     return "\n".join([_HEAD, *(_group(*group) for group in groups), _QUALITY_OF_SERVICE.format(deepest=DEEPEST)])
 
 

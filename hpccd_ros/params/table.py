@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of the node's parameters: of it are made checks, declarations and docs/parameters.md."""
+"""The table of the node's parameters, from which checks, declarations and docs/parameters.md are made."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -16,9 +16,9 @@ ALWAYS, UNCONFIGURED, NEVER = "always", "unconfigured", "never"
 class Row:
     """One parameter.
 
-    ``span``: closed range of a number; ``least``: the smallest beside 0; ``choices``: allowed strings (of each entry).
-    ``change``: ALWAYS; UNCONFIGURED: only while the node is unconfigured (before configure, after clean-up), as it is
-    read there; NEVER: read-only.
+    ``span``: closed range of a number; ``least``: smallest value besides 0; ``choices``: allowed strings (of each
+    entry). ``change``: ALWAYS; UNCONFIGURED: only while the node is unconfigured, because it is read when the node is
+    configured; NEVER: read-only.
     """
 
     name: str
@@ -32,15 +32,15 @@ class Row:
     change: str = UNCONFIGURED
 
 
-# Of the files of a split recording: smaller ones would hold a message each, and beginning a file takes longer (a few
-# milliseconds) than messages may wait.
+# Smallest files of a split recording: smaller ones would contain one message each, and opening a file takes a few
+# milliseconds, longer than messages may wait.
 LEAST_SPLIT_SIZE = 0.01  # MB
 LEAST_SPLIT_TIME = 0.1  # s
 MOST_SPLIT = 1e9  # MB, s
 
-# The largest coordinate that the core takes: no distance between two points is worth asking for beyond a few of it.
+# The largest coordinate that the core accepts, and the largest distance.
 FARTHEST = 1e150
-# Of a step that is cut.
+# Most parts into which a step is cut.
 MOST_PARTS = 1000
 
 SCENE_ROWS = (
@@ -48,56 +48,63 @@ SCENE_ROWS = (
         "robots",
         "string[]",
         [],
-        "Names of robots: each link of one that has geometry is a mesh ROBOT/LINK, behind those of `meshes`. Each name "
-        "makes the parameters robot.NAME.*",
+        "Names of robots. Each link with geometry is a mesh ROBOT/LINK, after those of `meshes`; each name "
+        "has parameters robot.NAME.*",
         change=NEVER,
     ),
     Row(
         "meshes",
         "string[]",
         [],
-        "Names of the meshes of the scene, in the order of the core's numbering. Each name "
-        "makes the topics meshes/NAME/... and the parameters mesh.NAME.*",
+        "Names of the meshes of the scene, in the order of scene-wide indices. Each name has topics "
+        "meshes/NAME/... and parameters mesh.NAME.*",
         change=NEVER,
     ),
     Row(
         "ignored_pairs",
         "string[]",
         [],
-        "Pairs of meshes that are never tested against each other, each as NAME:NAME. A robot's name stands for all of "
+        "Pairs of meshes that are not tested against each other, as NAME:NAME. The name of a robot means all "
         "its links, here and in all parameters of pairs",
     ),
     Row(
         "pair_accuracy",
         "string[]",
         [],
-        "Pairs of meshes that are tested at another accuracy, each as NAME:NAME:TIER; the same name twice: within it",
+        "Pairs of meshes with another tier, as NAME:NAME:TIER. The same name twice: within that mesh",
     ),
     Row(
         "pair_features",
         "string[]",
         [],
-        "Pairs of meshes of which other features are tested, each as NAME:NAME:KIND with vertex_face or edge_edge; two "
-        "entries of a pair: both; the same name twice: within it",
+        "Pairs of meshes with other features, as NAME:NAME:KIND, where KIND is vertex_face or edge_edge. Two "
+        "entries for a pair: both kinds. The same name twice: within that mesh",
     ),
     Row(
         "autostart",
         "bool",
         True,
-        "Configure and activate at once; false: wait for the life-cycle services",
+        "Configure and activate at start; false: wait for the life-cycle services",
         change=NEVER,
     ),
 )
 
 DETECTION_ROWS = (
-    Row("accuracy", "string", "exact", "Tier of the elementary tests", choices=ACCURACIES, change=ALWAYS),
-    Row("backend", "string", "auto", "Where the core runs", choices=BACKENDS, change=ALWAYS),
+    Row("accuracy", "string", "exact", "Accuracy tier of the narrow phase", choices=ACCURACIES, change=ALWAYS),
+    Row(
+        "backend",
+        "string",
+        "auto",
+        "Where the core computes; auto: the fastest for the scene and machine",
+        choices=BACKENDS,
+        change=ALWAYS,
+    ),
     Row("threads", "int", 0, "Threads of the core; 0: all cores", span=(0, 1024), change=ALWAYS),
     Row(
         "report",
         "string",
         "all",
-        "Every contact, those at the earliest time, or any one",
+        "All contacts of the step, those at the earliest time of impact, or any one contact",
         choices=REPORTS,
         change=ALWAYS,
     ),
@@ -105,17 +112,25 @@ DETECTION_ROWS = (
         "features",
         "string[]",
         list(FEATURES),
-        "What is tested at all: vertices against faces, edges against edges, or both",
+        "Pairs of features that are tested: vertices against faces, edges against edges, or both",
         choices=FEATURES,
         change=ALWAYS,
     ),
-    Row("outputs", "string[]", [], "Computed and sent beside the contacts", choices=OUTPUTS, change=ALWAYS),
+    Row(
+        "outputs",
+        "string[]",
+        [],
+        "Additional arrays of each contact: contact points, normals, nearest points of both sides",
+        choices=OUTPUTS,
+        change=ALWAYS,
+    ),
     Row(
         "minimum_separation",
         "float",
         0.0,
-        "A contact is a pair of features that comes this near, or touches; 0: that touches. Keep it below the shortest "
-        "edge: neighbours count that share no vertex",
+        "A pair of features whose distance is at most this value at some time of the step is a contact; 0: "
+        "only pairs that touch. Keep it below the shortest edge: neighbouring features that share no vertex "
+        "count",
         unit="unit of the vertices",
         span=(0.0, FARTHEST),
         change=ALWAYS,
@@ -124,7 +139,7 @@ DETECTION_ROWS = (
         "pair_separation",
         "string[]",
         [],
-        "Pairs of meshes with a separation of their own, each as NAME:NAME:DISTANCE; the same name twice: within it",
+        "Pairs of meshes with another separation, as NAME:NAME:DISTANCE. The same name twice: within that mesh",
         change=ALWAYS,
     ),
     Row(
@@ -138,17 +153,17 @@ DETECTION_ROWS = (
         "pair_summaries",
         "bool",
         False,
-        "Publish on pairs, for each pair of meshes, how many contacts the step has, the time of the first, and the "
-        "smallest distance where `distances` is true",
+        "Publish on pairs, for each pair of meshes, the number of contacts, the first time of impact and, "
+        "with `distances`, the smallest distance",
         change=ALWAYS,
     ),
     Row(
         "rigid_tolerance",
         "float",
         1e-3,
-        "Meshes that move by poses turn, and the core knows straight lines: a step is cut into as few parts as bring "
-        "the two this near to each other. Nothing is missed; what is reported comes within the separation and twice "
-        "the bounds of both meshes, which each answer tells",
+        "Largest deviation of straight lines from the rotation of meshes that move by poses; each step is cut"
+        " into as few parts as this requires. No false negatives; false positives are within the separation "
+        "plus twice the bounds of both meshes, which each result contains",
         unit="unit of the vertices",
         span=(1e-9, FARTHEST),
         change=ALWAYS,
@@ -157,7 +172,8 @@ DETECTION_ROWS = (
         "rigid_parts",
         "int",
         64,
-        "Most parts of a step. Where more were needed, bounds exceed rigid_tolerance, and still nothing is missed",
+        "Largest number of parts of a step. If more are required, the bounds exceed rigid_tolerance; there "
+        "are still no false negatives",
         span=(1, MOST_PARTS),
         change=ALWAYS,
     ),
@@ -165,7 +181,7 @@ DETECTION_ROWS = (
         "max_contacts",
         "int",
         200_000,
-        "Most contacts in one message: the earliest are kept, `truncated` is set; 0: no limit",
+        "Most contacts in a message: the earliest are kept, and `truncated` is set; 0: no limit",
         span=(0, 100_000_000),
         change=ALWAYS,
     ),
@@ -176,15 +192,15 @@ INPUT_ROWS = (
         "frame_id",
         "string",
         "",
-        "Coordinate frame of the scene, which all vertex messages must carry or be transformed to; empty: that of the "
-        "first one, until a restart or a new publisher brings another",
+        "Coordinate frame of the scene, which all vertex messages must have or be transformed to. Empty: that"
+        " of the first message, until a restart or a new publisher brings another",
     ),
     Row(
         "frame_queue",
         "int",
         1,
-        "Complete frames that may wait for the detection; 1: only the latest. The oldest gives "
-        "way, counted as overload",
+        "Complete frames that may wait for the detection; 1: only the newest. The oldest is dropped and "
+        "counted as overload",
         span=(1, 100_000),
     ),
     Row(
@@ -198,14 +214,15 @@ INPUT_ROWS = (
         "stamp_match",
         "string",
         "exact",
-        "How frames of several meshes are joined: equal stamps, or nearest to those of the first deforming mesh",
+        "How frames of several meshes are joined: by equal stamps, or by the stamp nearest to that of the "
+        "first deforming mesh",
         choices=("exact", "nearest"),
     ),
     Row(
         "stamp_tolerance",
         "float",
         0.01,
-        "Largest difference of stamps for stamp_match nearest",
+        "Largest difference of stamps with stamp_match nearest",
         unit="s",
         span=(0.0, 3600.0),
     ),
@@ -213,8 +230,8 @@ INPUT_ROWS = (
         "restart_after",
         "int",
         5,
-        "Frames in a row with increasing stamps before the last accepted one, or in another coordinate frame than the "
-        "first one brought, that are taken as a restart of the stream; 0: never",
+        "A stream restarts after this number of frames in a row with increasing stamps before the last "
+        "accepted one, or in another coordinate frame than the first message; 0: never",
         span=(0, 1_000_000),
         change=ALWAYS,
     ),
@@ -222,24 +239,24 @@ INPUT_ROWS = (
         "input_reliability",
         "string",
         "reliable",
-        "Reliability of the subscriptions to vertices, points, shapes, markers, poses and joint states; best_effort "
-        "also accepts best-effort publishers, and may lose large messages",
+        "Reliability of the subscriptions to vertices, points, shapes, markers, poses and joint states. "
+        "best_effort also connects to best-effort publishers, and may lose large messages",
         choices=("reliable", "best_effort"),
     ),
     Row(
         "input_depth",
         "int",
         10,
-        "QoS history depth of the vertex subscriptions: messages that may come at once without loss",
+        "QoS history depth of the vertex subscriptions: messages that may arrive at once without loss",
         span=(1, 1000),
     ),
-    Row("max_vertices", "int", 5_000_000, "Largest mesh accepted", unit="vertices", span=(1, 1_000_000_000)),
-    Row("max_faces", "int", 10_000_000, "Largest mesh accepted", unit="triangles", span=(1, 1_000_000_000)),
+    Row("max_vertices", "int", 5_000_000, "Most vertices of a mesh", unit="vertices", span=(1, 1_000_000_000)),
+    Row("max_faces", "int", 10_000_000, "Most triangles of a mesh", unit="triangles", span=(1, 1_000_000_000)),
     Row(
         "max_edges",
         "int",
         10_000_000,
-        "Most edges beside those of the triangles",
+        "Most edges of a mesh, besides those of its triangles",
         unit="edges",
         span=(1, 1_000_000_000),
     ),
@@ -247,7 +264,7 @@ INPUT_ROWS = (
         "max_rate",
         "float",
         1000.0,
-        "Most messages a second that are looked at of each input topic, as a mean over a second; more are dropped, "
+        "Most messages per second of each input topic, averaged over a second. Further ones are dropped and "
         "counted as rate; 0: no limit",
         unit="Hz",
         span=(0.0, 1e6),
@@ -256,33 +273,33 @@ INPUT_ROWS = (
         "count_unknown_meshes",
         "bool",
         True,
-        "Subscribe (raw) to vertex topics of meshes that are not in `meshes`, to "
-        "count their frames; false: only name the topics in the diagnostics",
+        "Subscribe to vertex topics of meshes that are not in `meshes`, to count their frames; false: only "
+        "name the topics on /diagnostics",
     ),
 )
 
 SERVICE_ROWS = (
-    Row("max_meshes", "int", 1000, "Most meshes in a request of ~/detect", span=(1, 1_000_000)),
+    Row("max_meshes", "int", 1000, "Most meshes in a request", span=(1, 1_000_000)),
     Row(
         "detect_jobs",
         "int",
         2,
-        "Requests of ~/detect that are computed at the same time; of as many scenes what was built is kept for further "
-        "requests, until nobody asks about them for a minute",
+        "Requests that are computed at the same time. The scenes of this number of requests are kept for "
+        "further requests, until none has used them for a minute",
         span=(1, 256),
     ),
     Row(
         "detect_waiting",
         "int",
         8,
-        "Requests of ~/detect that may wait; more, up to 1,000 at once, are refused as busy",
+        "Requests that may wait. Up to 1,000 more are answered as busy",
         span=(0, 10_000),
     ),
     Row(
         "detect_time_limit",
         "float",
         30.0,
-        "Answer of ~/detect after this time at the latest, where the request sets no limit, which counts up to a day",
+        "Time limit of a request that sets none. A request may set up to a day",
         unit="s",
         span=(0.001, 86_400.0),
         change=ALWAYS,
@@ -291,7 +308,8 @@ SERVICE_ROWS = (
         "service_introspection",
         "string",
         "off",
-        "Publish the events of ~/detect on ~/detect/_service_event: who asked and was answered when, or also what",
+        "Publish events of the service on ~/detect/_service_event: metadata (time, client, sequence number), "
+        "or also the contents of requests and responses",
         choices=("off", "metadata", "contents"),
         change=ALWAYS,
     ),
@@ -302,7 +320,8 @@ OUTPUT_ROWS = (
         "contacts_durability",
         "string",
         "volatile",
-        "QoS of contacts; transient_local also gives the last answers to subscribers that come later and ask for it",
+        "Durability of contacts. With transient_local, subscribers that request it receive the last results when "
+        "they connect: as many as the depth in qos_overrides, by default 10; none if the publisher is best_effort",
         choices=("volatile", "transient_local"),
     ),
     Row("diagnostics_period", "float", 1.0, "Period of /diagnostics", unit="s", span=(0.05, 3600.0)),
@@ -310,16 +329,18 @@ OUTPUT_ROWS = (
         "markers",
         "bool",
         False,
-        "For viewers: publish contact points and normals on markers, and the vertices on surface",
+        "Publish contact points and normals on markers, and vertices on surface, for viewers",
         change=ALWAYS,
     ),
-    Row("markers_max", "int", 2000, "Most contacts drawn; evenly thinned out", span=(1, 1_000_000), change=ALWAYS),
-    Row("markers_rate", "float", 10.0, "Most marker messages a second", unit="Hz", span=(0.001, 1000.0), change=ALWAYS),
+    Row("markers_max", "int", 2000, "Most contacts drawn, sampled evenly", span=(1, 1_000_000), change=ALWAYS),
+    Row(
+        "markers_rate", "float", 10.0, "Most marker messages per second", unit="Hz", span=(0.001, 1000.0), change=ALWAYS
+    ),
     Row(
         "markers_size",
         "float",
         0.01,
-        "Diameter of a point; a normal is ten times as long",
+        "Diameter of a point; normals are ten times as long",
         unit="unit of the vertices",
         span=(1e-9, 1e9),
         change=ALWAYS,
@@ -331,18 +352,25 @@ RECORDING_ROWS = (
         "record",
         "string",
         "",
-        "Record the meshes and contacts while active: a file ending in .mcap, or a folder; % codes of strftime for "
-        "the date, a number is added where it exists; empty: do not. Changing it begins and ends recordings",
+        "Record inputs and results while active: a file ending in .mcap, or a folder. It may contain strftime"
+        " codes (%Y...) for the date; a number is added if it exists. Empty: no recording. Setting it starts "
+        "and ends recordings",
         change=ALWAYS,
     ),
     Row(
-        "record_compression", "string", "none", "Of the next recording", choices=("none", "lz4", "zstd"), change=ALWAYS
+        "record_compression",
+        "string",
+        "none",
+        "Compression of the next recording",
+        choices=("none", "lz4", "zstd"),
+        change=ALWAYS,
     ),
     Row(
         "record_split_size",
         "float",
         0.0,
-        "A new file after so much, before compression, in a folder; 0: no limit. For the next recording",
+        "Size of a file, before compression, after which the next one begins, in a folder; 0: no limit. For "
+        "the next recording",
         unit="MB",
         span=(0.0, MOST_SPLIT),
         least=LEAST_SPLIT_SIZE,
@@ -352,7 +380,7 @@ RECORDING_ROWS = (
         "record_split_time",
         "float",
         0.0,
-        "A new file after so long, in a folder; 0: no limit. For the next recording",
+        "Duration of a file after which the next one begins, in a folder; 0: no limit. For the next recording",
         unit="s",
         span=(0.0, MOST_SPLIT),
         least=LEAST_SPLIT_TIME,
@@ -362,7 +390,7 @@ RECORDING_ROWS = (
         "record_flush",
         "float",
         0.5,
-        "Most that a killed node can lose of the next recording",
+        "Most that a killed node loses of the next recording",
         unit="s",
         span=(0.0, 3600.0),
         change=ALWAYS,
@@ -374,9 +402,9 @@ STOP_ROWS = (
         "stop_distance",
         "float",
         -1.0,
-        "Publish on stop whether different meshes came this near, or touched, on the last step, or nobody knows; 0: "
-        "only whether they touched; negative: no topic stop. It can be made larger or smaller at any time, but not be "
-        "switched on or off while the node is configured",
+        "Publish on stop whether different meshes were within this distance, or touched, during the last "
+        "step, or the state is unknown; 0: whether they touched; negative: no topic stop. It may be changed "
+        "at any time, but only switched on or off while the node is unconfigured",
         unit="unit of the vertices",
         span=(-1.0, FARTHEST),
         change=ALWAYS,
@@ -385,8 +413,9 @@ STOP_ROWS = (
         "stop_timeout",
         "float",
         0.5,
-        "stop is true when no result was produced for a frame of which all messages, the oldest included, were sent "
-        "within this time; stop is published four times in this time, which is also its deadline and liveliness lease",
+        "stop is true when no result was produced for a frame whose messages were all, the oldest included, "
+        "sent within this time. stop is published four times in this time, which is also its deadline and "
+        "liveliness lease",
         unit="s",
         span=(0.01, 3600.0),
     ),
@@ -394,43 +423,55 @@ STOP_ROWS = (
         "clock_error",
         "float",
         CLOCK_ERROR,
-        "Largest difference between the system clocks of the machines (NTP, PTP). A message from further in the "
-        "future, or a larger jump of the system clock, makes stop true until the clocks have agreed for stop_timeout",
+        "Largest difference between the system clocks of the machines (NTP, PTP). A message from further in "
+        "the future, or a larger jump of the system clock, makes stop true until the clocks have agreed for "
+        "stop_timeout",
         unit="s",
         span=(0.0, 10.0),
     ),
 )
 
-# Under the headings that the documentation gives them.
+# Heading in the documentation -> rows.
 NODE_GROUPS = {
     "Scene and start": SCENE_ROWS,
     "Detection": DETECTION_ROWS,
     "Stop": STOP_ROWS,
     "Input": INPUT_ROWS,
     "Service `~/detect`": SERVICE_ROWS,
-    "What is published": OUTPUT_ROWS,
+    "Output": OUTPUT_ROWS,
     "Recording": RECORDING_ROWS,
 }
 NODE_ROWS = tuple(row for rows in NODE_GROUPS.values() for row in rows)
 
-# Of pairs of meshes: pairs.NAME.*, where NAME is any.
+# Prefix of the parameters of pairs of meshes: pairs.NAME.*, with any NAME.
 PAIRS = "pairs"
 
-# None: not said; "" and [] say nothing either.
+# Defaults None, "" and [] mean: not set.
 PAIR_ROWS = (
-    Row("meshes", "string[]", [], "The two meshes of the pair; the same name twice: within it"),
+    Row(
+        "meshes",
+        "string[]",
+        [],
+        "The two meshes of the pair; the same name twice: within that mesh. A new NAME is only read at the start",
+    ),
     Row("accuracy", "string", "", "Tier, instead of `accuracy`; empty: that one", choices=ACCURACIES),
     Row(
         "separation",
         "float",
         None,
-        "Contact from this distance on, instead of `minimum_separation`; not set: that one",
+        "Separation, instead of `minimum_separation`; not set: that one",
         unit="unit of the vertices",
         span=(0.0, FARTHEST),
         change=ALWAYS,
     ),
-    Row("features", "string[]", [], "What is tested, instead of `features`; empty: that", choices=FEATURES),
-    Row("ignored", "bool", None, "Never tested against each other; not set: what `ignored_pairs` says"),
+    Row(
+        "features",
+        "string[]",
+        [],
+        "Pairs of features that are tested, instead of `features`; empty: those",
+        choices=FEATURES,
+    ),
+    Row("ignored", "bool", None, "Do not test the pair; not set: as in `ignored_pairs`"),
 )
 
 MESH_ROWS = (
@@ -438,10 +479,10 @@ MESH_ROWS = (
         "input",
         "string",
         "vertices",
-        "Topic of the positions: meshes/NAME/vertices (MeshVertices) or meshes/NAME/points (PointCloud2); of positions "
-        "and topology: meshes/NAME/shape (shape_msgs/Mesh) or meshes/NAME/marker (Marker of type TRIANGLE_LIST); of a "
-        "mesh that keeps its shape: meshes/NAME/pose (PoseStamped), or tf: no topic, the transform from `frame` to "
-        "frame_id moves it",
+        "Source of the positions. vertices (MeshVertices), points (PointCloud2): on the topic "
+        "meshes/NAME/INPUT. shape (shape_msgs/Mesh), marker (Marker of type TRIANGLE_LIST): positions and "
+        "topology on that topic. For a rigid mesh pose (PoseStamped on that topic), or tf: no topic, the "
+        "transform from `frame` to frame_id moves it",
         choices=INPUTS,
     ),
     Row("static", "bool", False, "Does not move: positions from the file or from one message"),
@@ -450,35 +491,35 @@ MESH_ROWS = (
         "file",
         "string",
         "",
-        "Mesh file (OBJ, PLY, STL, or DAE, which needs the extra meshes) with the topology, version 0, and for a "
-        "static mesh the positions: a path, package://PACKAGE/PATH or file:///PATH",
+        "Mesh file (OBJ, PLY, STL; DAE with the extra meshes) with the topology, as version 0, and the "
+        "positions of a static or rigid mesh: a path, package://PACKAGE/PATH or file:///PATH",
     ),
     Row(
         "transform",
         "string",
         "none",
-        "How the positions of the messages get into the scene's frame: as they are; by `pose`; or by the "
-        "transform from header.frame_id to `frame_id` at their stamp, from /tf or transforms",
+        "How positions are transformed to the scene: none; by `pose`; or by the transform from "
+        "header.frame_id to `frame_id` at their stamp, from /tf or transforms",
         choices=("none", "pose", "tf"),
     ),
     Row(
         "frame",
         "string",
         "",
-        "Coordinate frame that the messages must carry, where they are transformed; taken where theirs is "
-        "empty; empty: any",
+        "Coordinate frame of messages that are transformed: others are rejected, and an empty header.frame_id"
+        " means this one; empty: any. With input tf: the frame of the mesh",
     ),
     Row(
         "pose",
         "float[]",
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
-        "Where the file's vertices, and with transform pose those of the messages, are placed: translation x y z, unit "
-        "quaternion x y z w",
+        "Placement of the vertices of the file and, with transform pose, of the messages: translation x y z, "
+        "unit quaternion x y z w",
         unit="unit of the vertices",
     ),
 )
 
-# Of robots: robot.NAME.* of each NAME in `robots`.
+# Prefix of the parameters of robots: robot.NAME.* for each NAME in `robots`.
 ROBOT = "robot"
 
 ROBOT_ROWS = (
@@ -486,32 +527,32 @@ ROBOT_ROWS = (
         "description",
         "string",
         "robot_description",
-        "The URDF: the name of a topic of std_msgs/String, latched, as robot_state_publisher offers it; or a file, "
-        "whose name has a point: a path, package://PACKAGE/PATH or file:///PATH",
+        "URDF: a latched topic of std_msgs/String, as published by robot_state_publisher; or a file, if the "
+        "name contains a dot: a path, package://PACKAGE/PATH or file:///PATH",
     ),
-    Row("geometry", "string", "collision", "Which shapes of the links count", choices=("collision", "visual")),
-    Row("srdf", "string", "", "SRDF file: what it disables is never tested; empty: neighbouring links alone are not"),
+    Row("geometry", "string", "collision", "Which shapes of the links are used", choices=("collision", "visual")),
+    Row("srdf", "string", "", "SRDF file whose disabled pairs are not tested; empty: only neighbouring links are not"),
     Row(
         "joint_states",
         "string",
         "",
-        "Topic of sensor_msgs/JointState by which the joints move; empty: links move by the transforms from "
+        "Topic of sensor_msgs/JointState that moves the joints; empty: links move by the transforms from "
         "`frame_prefix` + LINK to `frame_id`",
     ),
-    Row("frame_prefix", "string", "", "Before the names of links in transforms"),
+    Row("frame_prefix", "string", "", "Prefix of the names of links in transforms"),
     Row(
         "pose",
         "float[]",
         [],
-        "With `joint_states`: where the root link stands in the scene, translation x y z, unit quaternion x y z w; "
-        "empty: the transform from `frame_prefix` + ROOT to `frame_id` says it",
+        "With `joint_states`: placement of the root link in the scene, translation x y z, unit quaternion x y"
+        " z w; empty: the transform from `frame_prefix` + ROOT to `frame_id`",
         unit="unit of the vertices",
     ),
     Row(
         "tolerance",
         "float",
         1e-3,
-        "How far the triangles of cylinders, spheres and capsules may stand out of them",
+        "How far the triangles of cylinders, spheres and capsules may stand out of the shape",
         unit="unit of the vertices",
         span=(1e-9, FARTHEST),
     ),
