@@ -16,6 +16,7 @@ _HEAD = """\
 [config/hpccd.yaml](../config/hpccd.yaml) contains all parameters with their defaults. Copy it, enter your meshes, and
 start the node with it:
 
+<!-- not run: my.yaml is yours -->
 ```sh
 hpccd_node --ros-args --params-file my.yaml
 ```

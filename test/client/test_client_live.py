@@ -184,9 +184,11 @@ def assert_shown(program: Path, output: str) -> None:
 
 def shown_after(program: Path) -> str:
     """The first block of text that a page shows after the program."""
-    within = "(?:(?!```).)*"
-    pattern = f"```python\n({within})```{within}```text\n({within})```"
-    blocks = [block for page in PAGES for block in re.findall(pattern, page.read_text(), re.DOTALL)]
-    shown = [text for block, text in blocks if statements(block) == statements(program.read_text())]
-    assert shown, f"no page shows what {program.name} prints"
-    return shown[0]
+    for page in PAGES:
+        blocks = re.findall(r"^```(\w+)\n(.*?)^```$", page.read_text(), re.DOTALL | re.MULTILINE)
+        for number, (_, block) in enumerate(blocks):
+            if statements(block) == statements(program.read_text()):
+                for language, text in itertools.takewhile(lambda block: block[0] != "python", blocks[number + 1 :]):
+                    if language == "text":
+                        return text
+    raise AssertionError(f"no page shows what {program.name} prints")
