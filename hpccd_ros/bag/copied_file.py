@@ -10,16 +10,15 @@ from hpccd_ros.bag.bag_file import COMPRESSIONS
 
 
 class CopiedFile:
-    """A context manager: its end finishes the file, or removes it if there was an exception.
+    """A context manager: its end finishes the file. `path` does not exist yet, or is replaced.
 
-    compression: "none", "lz4" or "zstd". Raises FileExistsError if `path` exists, ValueError for another compression.
+    compression: "none", "lz4" or "zstd". Raises ValueError for another one.
     """
 
     def __init__(self, path: Path, *, profile: str, library: str, compression: str):
         if compression not in COMPRESSIONS:
             raise ValueError(f"compression {compression!r} is none of {', '.join(COMPRESSIONS)}")
-        self._path = path
-        self._stream = open(path, "xb")
+        self._stream = open(path, "wb")
         self._writer = Writer(self._stream, compression=COMPRESSIONS[compression])
         self._header = {"profile": profile, "library": library}
         self._numbers: dict[tuple, int] = {}
@@ -30,16 +29,9 @@ class CopiedFile:
         return self
 
     def __exit__(self, error, *_) -> None:
-        try:
+        with self._stream:
             if error is None:
                 self._writer.finish()
-            self._stream.close()
-        except BaseException as failed:
-            error = failed
-            raise
-        finally:
-            if error is not None:
-                self._path.unlink()
 
     def describe(self, schema: Schema | None, channel: Channel) -> int:
         """The number of a channel in this file; channels with equal descriptions have one number."""

@@ -14,6 +14,7 @@ from hpccd_ros.bag.decode import make_decoder
 from hpccd_ros.bag.examine import examine
 from hpccd_ros.bag.reader import RecordedMessage, Recording, RecordingError, StoredMessage
 from hpccd_ros.base.version import package_version
+from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.middleware import transform_topics
 from hpccd_ros.middleware.message_types import (
     DESCRIPTION,
@@ -92,11 +93,21 @@ def cut(
     if first is None:
         raise RecordingError(f"{recording.path} has no messages, so nothing can be cut out of it")
     start, stop = _limits(recording, first, begin, end, watch)
+    with whole_file(target) as draft:
+        count, last, in_force = _copy(recording, draft, first, start, stop, compression, watch)
+        check = examine(draft)
+        if not check.sound or check.message_count != count:
+            raise RecordingError(f"{target} was not written correctly: {check.problem}; check its disk")
+    return Part(start - first, min(last + 1, stop) - first, count, in_force)
+
+
+def _copy(recording, draft, first, start, stop, compression, watch) -> tuple[int, int, int]:
+    """(messages, receive time of the last one, how many of them were in force at the beginning)."""
     kept = _InForce(recording)
     count = 0
     last = first
     with CopiedFile(
-        target,
+        draft,
         profile=recording.profile,
         library=f"hpccd {package_version()} (cut)",
         compression=compression or recording.compression,
@@ -125,11 +136,7 @@ def cut(
             raise RecordingError(
                 f"{recording.path} has no message in this part; its messages are from 0 to {seconds(last - first)} s"
             )
-    check = examine(target)
-    if not check.sound or check.message_count != count:
-        target.unlink()
-        raise RecordingError(f"{target} was not written correctly: {check.problem}; check its disk")
-    return Part(start - first, min(last + 1, stop) - first, count, kept.taken)
+    return count, last, kept.taken
 
 
 def seconds(nanoseconds: int) -> str:

@@ -8,25 +8,32 @@ from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from hpccd_ros.bag.copied_file import CopiedFile
 from hpccd_ros.bag.examine import Examination, examine
 from hpccd_ros.bag.reader import RecordingError
+from hpccd_ros.base.whole_file import whole_file
 
 
 def recover(source, target, compression=None) -> Examination:
     """Copy every whole record of `source` into the new, finished file `target`; the result tells what was there.
 
     compression: "none", "lz4", "zstd"; None: that of the source.
-    Raises RecordingError where `source` holds nothing to save, FileExistsError where `target` exists.
+    Raises RecordingError where `source` holds nothing to save or `target` does not hold what was saved, FileExistsError
+    where `target` exists.
     """
     source, target = Path(source), Path(target)
     first = examine(source)
     if first.message_count == 0:
         raise RecordingError(f"{source} holds no whole message ({first.problem or 'an empty recording'})")
-    with CopiedFile(
-        target,
-        profile=first.profile,
-        library=f"{first.library} (recovered)",
-        compression=compression or first.compression,
-    ) as file:
-        return examine(source, _Copy(file))
+    with whole_file(target) as draft:
+        with CopiedFile(
+            draft,
+            profile=first.profile,
+            library=f"{first.library} (recovered)",
+            compression=compression or first.compression,
+        ) as file:
+            found = examine(source, _Copy(file))
+        check = examine(draft)
+        if not check.sound or check.message_count != found.message_count:
+            raise RecordingError(f"{target} was not written correctly: {check.problem}; check its disk")
+    return found
 
 
 class _Copy:

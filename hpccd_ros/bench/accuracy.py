@@ -26,6 +26,7 @@ from pathlib import Path
 
 from hpccd_core.options import ACCURACIES, SIMD
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.bench import choice, command, measure
 from hpccd_ros.bench.report import Report, cores, show
 
@@ -163,6 +164,7 @@ def draw(rows: list[dict], path: Path) -> None:
         axis.set_ylabel(f"{label} (0 at {floor:g})")
     page.legend(marks.values(), marks, loc="outside right center", fontsize=8)
     try:
-        page.savefig(path, dpi=150)
+        with whole_file(path, overwrite=True) as draft:
+            page.savefig(draft, dpi=150)
     except (OSError, ValueError) as error:
         raise UserError(f"--picture {path}: cannot be written: {error}") from error

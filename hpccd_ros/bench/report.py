@@ -18,7 +18,9 @@ from rich.console import Console
 from rich.table import Table
 
 import hpccd_core as hc
+from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.version import package_version
+from hpccd_ros.base.whole_file import whole_file
 
 # Head of a column -> key of a row, or a function of the row.
 Columns = dict[str, str | Callable[[dict], object]]
@@ -57,7 +59,11 @@ class Report:
         path = folder / f"{self.benchmark}-{label}.json"
         shown = {key: getattr(self, key) for key in ("benchmark", "command", "machine", "arguments")}
         lists = {key: getattr(self, key) for key in ("notes", "failures", "rows")}
-        path.write_text(as_text({**shown, "other_processes_share": others, **lists}), encoding="utf-8")
+        try:
+            with whole_file(path, overwrite=True) as draft:
+                draft.write_text(as_text({**shown, "other_processes_share": others, **lists}), encoding="utf-8")
+        except OSError as error:
+            raise UserError(f"--out {path}: cannot be written ({error.strerror})") from error
         for kind, texts in (("note: ", self.notes), ("FAILED: ", self.failures)):
             for text in texts:
                 print(kind + text)

@@ -9,12 +9,18 @@ No frame is dropped: each waits for the answer to the one before, so that a slow
   hpccd demo --scene arm-and-cloth --rate 60   an arm drags a cloth across a table
   hpccd demo --small                        a coarse mesh, compressed: a few hundred kilobytes
 
-Leaves DIR/demo.mcap and DIR/demo.png (a run replaces those of the run before), and the logs of the processes.
+Leaves DIR/demo.mcap and DIR/demo.png, and the logs of the processes. A run that succeeds replaces the files of the run
+before; one that fails or is interrupted leaves them as they are.
 Uses a DDS domain of its own unless ROS_DOMAIN_ID is set. Ctrl-C ends all processes.
 """
 
+import difflib
+
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.feature_list import feature_list
+from hpccd_ros.params.table import ACCURACIES, NODE_ROWS
+
+MOST_THREADS = next(row.span[1] for row in NODE_ROWS if row.name == "threads")
 
 
 def configure(parser):
@@ -47,8 +53,12 @@ def configure(parser):
 def run(args) -> int:
     if not 0 < args.rate <= 1000:
         raise UserError(f"--rate {args.rate}: must be above 0, at most 1000 Hz")
-    if args.threads < 0:
-        raise UserError(f"--threads {args.threads}: must not be negative")
+    if not 0 <= args.threads <= MOST_THREADS:
+        raise UserError(f"--threads {args.threads}: must be from 0 to {MOST_THREADS}")
+    if args.accuracy is not None and args.accuracy not in ACCURACIES:
+        near = difflib.get_close_matches(args.accuracy, ACCURACIES, n=1)
+        remedy = f"did you mean {near[0]}?" if near else f"use one of {', '.join(ACCURACIES)}"
+        raise UserError(f"--accuracy {args.accuracy}: not a tier; {remedy}")
     if args.small:
         args.size, args.compression = 0.15, "zstd"
     from hpccd_ros.demo import run as demo

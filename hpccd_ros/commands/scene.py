@@ -101,8 +101,11 @@ def run(args) -> int:
             self_collision = "" if mesh.self_collision else ", no self-collision"
             print(f"  {mesh.name}: {len(mesh.faces):,} triangles{static}{self_collision}")
         print("add --publish, --mcap FILE, --npz FILE, --params FILE or --png FILE to use it")
+    frames = _frames(scene, args.at) if args.png else []
+    if args.step is not None and not 1 <= args.step < scene.n_frames:
+        raise UserError(f"--step {args.step}: the scene has steps 1 to {scene.n_frames - 1}")
     try:
-        _write(scene, args)
+        _write(scene, args, frames)
     except FileExistsError as error:
         exists = f"{error.filename} exists and is not overwritten; remove it or name another"
         raise UserError(exists if error.filename else str(error)) from error
@@ -129,12 +132,12 @@ def _check(args):
         raise UserError("--step belongs to --npz")
     if args.at and not args.png:
         raise UserError("--at belongs to --png")
+    if args.mcap and not args.mcap.endswith(".mcap"):
+        raise UserError(f"--mcap {args.mcap}: name a file that ends in .mcap")
 
 
-def _write(scene, args):
+def _write(scene, args, frames):
     if args.mcap:
-        if not args.mcap.endswith(".mcap"):
-            raise UserError(f"--mcap {args.mcap}: name a file that ends in .mcap")
         from hpccd_ros.scenes import files
 
         files.write_mcap(scene, args.mcap, args.rate, args.compression, progress=True)
@@ -144,10 +147,8 @@ def _write(scene, args):
 
         if args.step is None:
             files.write_npz(scene, args.npz, progress=True)
-        elif 1 <= args.step < scene.n_frames:
-            files.write_step(scene, args.step, args.npz)
         else:
-            raise UserError(f"--step {args.step}: the scene has steps 1 to {scene.n_frames - 1}")
+            files.write_step(scene, args.step, args.npz)
         print(f"wrote {args.npz}")
     if args.params:
         from hpccd_ros.scenes import files
@@ -157,7 +158,6 @@ def _write(scene, args):
     if args.png:
         from hpccd_ros.picture import of_scene
 
-        frames = _frames(scene, args.at)
         try:
             of_scene.save(scene, frames, args.png)
         except ValueError as error:  # a suffix that matplotlib cannot write

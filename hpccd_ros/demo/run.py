@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The demo: start the processes, show how it goes, verify the recording, draw its worst frame."""
 
+import contextlib
 import os
+import shlex
 import shutil
 import signal
 import sys
@@ -14,15 +16,19 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from hpccd_ros import scenes
 from hpccd_ros.bag.examine import examine
 from hpccd_ros.bag.reader import Recording
+from hpccd_ros.bag.writer import free_path
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.demo.children import Children
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
 from hpccd_ros.scenes import files
 
-# What a run leaves behind, and the next one replaces.
-RECORDING, PICTURE, PARAMETERS = "demo.mcap", "demo.png", "node.yaml"
+# What a run leaves behind, and the next one replaces once it has succeeded.
+RECORDING, PICTURE, PARAMETERS = RESULTS = ("demo.mcap", "demo.png", "node.yaml")
 LOGS = ("node.log", "recorder.log", "publisher.log")
+# Kept where the contacts of the recording are not those that it is verified with.
+DIVERGED = "demo-diverged.mcap"
 # s for the last answers to reach the disk; reached where the recorder has lost some.
 WRITTEN = 30.0
 
@@ -30,29 +36,36 @@ WRITTEN = 30.0
 def main(args) -> int:
     """Run the demo as the options of `hpccd demo` say."""
     signal.signal(signal.SIGTERM, _interrupt)
+    scene = _scene(args)
     folder = Path(args.out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name in (RECORDING, PICTURE, PARAMETERS, *LOGS):
-            (folder / name).unlink(missing_ok=True)
-    except OSError as error:
-        raise UserError(f"--out {args.out}: {error.strerror}") from error
     if "ROS_DOMAIN_ID" not in os.environ:
         # A domain of its own: neither the nodes that run here already nor a second demo can mix with it.
         os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)
     console = Console(highlight=False, soft_wrap=True)
-    scene = _scene(args)
+    with contextlib.ExitStack() as stack:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            drafts = [stack.enter_context(whole_file(folder / name, overwrite=True)) for name in RESULTS]
+            for name in LOGS:
+                (folder / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise UserError(f"--out {args.out}: {error.strerror}") from error
+        worst = _run(args, scene, folder, *drafts, console)
+    _last_words(folder, console, worst)
+    return 0
+
+
+def _run(args, scene, folder, recording, picture, parameters, console):
+    """Write the recording, the picture and the node's parameters; returns the step with most contacts."""
     say = console.print
     say(
         f"[bold]scene[/]      {scene.title}\n           "
         + ", ".join(_parts(scene))
         + f"; {scene.n_frames} frames at {args.rate:g} a second"
     )
-    files.write_parameters(scene, folder / PARAMETERS)
-    _stream(args, scene, folder, console)
-    worst = _verify_and_draw(args, scene, folder, console)
-    _last_words(folder, console, worst)
-    return 0
+    files.write_parameters(scene, parameters)
+    _stream(args, scene, folder, recording, parameters, console)
+    return _verify_and_draw(args, scene, folder, recording, picture, console)
 
 
 def _interrupt(number, frame):
@@ -73,7 +86,7 @@ def _parts(scene):
         yield f"robot {robot.name} of {len(robot.meshes)} links {sum(len(m.faces) for m in robot.meshes):,} triangles"
 
 
-def _stream(args, scene, folder, console):
+def _stream(args, scene, folder, recording, parameters, console):
     # Imported here: ROS reads the domain when it is first used.
     from hpccd_ros.demo.monitor import Monitor
 
@@ -89,7 +102,7 @@ def _stream(args, scene, folder, console):
             "hpccd_ros.node",
             "--ros-args",
             "--params-file",
-            str(folder / PARAMETERS),
+            str(parameters),
             "-p",
             f"threads:={args.threads}",
             "-p",
@@ -102,7 +115,7 @@ def _stream(args, scene, folder, console):
             "hpccd_ros.cli",
             "record",
             "-o",
-            str(folder / RECORDING),
+            str(recording),
             "--compression",
             args.compression,
             # Room for the whole scene: a disk that is still busy with the installation may hold the recorder up.
@@ -122,7 +135,7 @@ def _stream(args, scene, folder, console):
         )
         steps = _steps(scene)
         _watch(monitor, children, publisher, steps, console)
-        _await_recorded(folder / RECORDING, monitor, children)
+        _await_recorded(recording, monitor, children)
         for child in (recorder, node):
             if children.end(child) != 0:
                 children.check()
@@ -200,11 +213,11 @@ def _state(monitor) -> str:
     return f"{monitor.contacts:,} contacts, {first}{core}, {monitor.dropped} dropped"
 
 
-def _verify_and_draw(args, scene, folder, console):
+def _verify_and_draw(args, scene, folder, path, picture, console):
     from hpccd_ros.picture.of_recording import History, draw_step
 
     history, worst = History(), None
-    with Recording(folder / RECORDING) as recording:
+    with Recording(path) as recording:
         replay = Replay(recording, recorded_setup.of_recording(recording), threads=args.threads, outputs=("points",))
         for step in replay.steps():
             if step.contacts is None:
@@ -213,22 +226,22 @@ def _verify_and_draw(args, scene, folder, console):
             if worst is None or step.total > worst.total:
                 worst = step
     if replay.diverged:
+        kept = free_path(folder / DIVERGED)
+        os.replace(path, kept)
         raise UserError(
             "computed again from the recording, the contacts differ from those that the node sent: "
-            f"{replay.first_divergence.difference}"
+            f"{replay.first_divergence.difference}; please report it with {kept}"
         )
     console.print(f"[bold]verified[/]   {replay.verified} recorded answers, computed again from the file: all equal")
     console.print("[bold]picture[/]    rendering the frame with most contacts ...")
-    draw_step(worst, folder / PICTURE, history, title=scene.title)
+    draw_step(worst, picture, history, title=scene.title)
     return worst
 
 
 def _last_words(folder, console, worst):
-    program = Path(sys.prefix) / "bin" / "hpccd"
-    command = os.path.relpath(program) if program.is_file() else "python -m hpccd_ros.cli"
-    if shutil.which("hpccd") and "VIRTUAL_ENV" in os.environ:
-        command = "hpccd"
+    command = hpccd_from_here()
     recording, picture = folder / RECORDING, folder / PICTURE
+    replayed = shlex.quote(str(recording))
     console.print(
         f"""
 [bold green]done[/]       worst frame: step {worst.step}, {worst.total:,} contacts
@@ -236,10 +249,28 @@ def _last_words(folder, console, worst):
            picture    {picture}
 
 try next
-  {command} replay {recording}            compute it again, compare every contact
-  {command} view {recording} --step {worst.step}    draw a frame of your choice
+  {command} replay {replayed}            compute it again, compare every contact
+  {command} view {replayed} --step {worst.step}    draw a frame of your choice
   {command} scene --list                          more scenes: {command} demo --scene n-body-like-lr
   {command} --help                                all commands""",
         markup=True,
         soft_wrap=True,
     )
+
+
+def hpccd_from_here() -> str:
+    """How the user's shell, in its folder, runs the hpccd that runs now."""
+    beside = Path(sys.executable).parent
+    search = os.environ.get("PATH", "").split(os.pathsep)
+    if "MAKELEVEL" in os.environ and search[:1] == [str(beside)]:
+        search = search[1:]  # which make has put there for its recipes
+    found, program = shutil.which("hpccd", path=os.pathsep.join(search)), beside / "hpccd"
+    if found and (_is_running(found) or (program.is_file() and os.path.samefile(found, program))):
+        return "hpccd"
+    if program.is_file():
+        return shlex.quote(min(os.path.relpath(program), str(program), key=len))
+    return f"{shlex.quote(sys.executable)} -m hpccd_ros.cli"
+
+
+def _is_running(program: str) -> bool:
+    return os.path.exists(sys.argv[0]) and os.path.samefile(program, sys.argv[0])

@@ -2,13 +2,13 @@
 """The picture of one step: shaded meshes, contacts as points coloured by their time, and the step in its context."""
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap, to_rgb
 from matplotlib.figure import Figure
 
+from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.picture.camera import Camera
 from hpccd_ros.picture.raster import rasterize
 from hpccd_ros.picture.shading import RADIUS, shade, tubes
@@ -54,7 +54,8 @@ class History:
 
 def draw(picture: Picture, path, history: History | None = None, **view) -> None:
     """Write the picture to `path` (PNG, or what else matplotlib writes, by its suffix); view: as compose() takes it."""
-    compose(picture, history, **view).savefig(Path(path), facecolor=BACKGROUND)
+    with whole_file(path, overwrite=True) as draft:
+        compose(picture, history, **view).savefig(draft, facecolor=BACKGROUND)
 
 
 def compose(picture: Picture, history: History | None = None, *, azimuth=-60.0, elevation=26.0, size=(1280, 860)):

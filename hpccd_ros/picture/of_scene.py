@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.frames.types import NO_EDGES
 from hpccd_ros.scenes.scene import Scene
 
@@ -46,4 +47,5 @@ def save(
             f"{scene.name}, frame {index}: {sum(map(len, scene.faces(index))):,} triangles", color=INK, fontsize=10
         )
     figure.tight_layout()
-    figure.savefig(Path(path), facecolor=BACKGROUND)
+    with whole_file(path, overwrite=True) as draft:
+        figure.savefig(draft, facecolor=BACKGROUND)

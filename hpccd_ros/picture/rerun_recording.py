@@ -34,7 +34,7 @@ class RerunWriter:
         if path is None:
             self._stream.spawn()
         else:
-            with open(path, "wb"):  # rerun tells of a path that cannot be written only in a log
+            with open(path, "wb"):  # rerun reports a path that cannot be written only in a log
                 pass
             self._stream.save(path)
         self._stream.send_recording_name(title)

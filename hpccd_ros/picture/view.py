@@ -8,6 +8,7 @@ from pathlib import Path
 
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.picture.of_recording import History, draw_step
 from hpccd_ros.picture.page.recording_page import write_page
 from hpccd_ros.picture.rerun_recording import RerunWriter, need_rerun
@@ -51,17 +52,20 @@ def _show_in_rerun(args, steps, source, title, view):
     target = args.output or (None if _has_screen() else f"{source.stem}.rrd")
     count = 0
     try:
-        with contextlib.closing(RerunWriter(title, target, **view)) as writer:
+        with contextlib.ExitStack() as stack:
+            draft = None if target is None else stack.enter_context(whole_file(target, overwrite=True))
+            writer = stack.enter_context(contextlib.closing(RerunWriter(title, draft, **view)))
             for number, step in enumerate(steps):
                 if step.step == args.step if args.step is not None else number % (args.every or 1) == 0:
                     writer.add(step)
                     count += 1
                     print(f"\r{count} steps", end="", flush=True)
+            print()
+            if not count:
+                which = "" if args.step is None else f" {args.step}"
+                raise UserError(f"{args.file}: no step{which} that can be shown{HINT}")
     except OSError as error:
         raise UserError(f"--output {target}: {error.strerror}") from error
-    print()
-    if not count:
-        raise UserError(f"{args.file}: no step{'' if args.step is None else f' {args.step}'} that can be shown{HINT}")
     if target is not None:
         print(f"{target}: {count} steps, {Path(target).stat().st_size / 1e6:.1f} MB; open it with: rerun {target}")
 
@@ -94,18 +98,24 @@ def _draw_one(args, steps, target, title, view):
     if chosen is None:
         there = _what_is_there(history, args)
         raise UserError(f"{args.file}: no step {'to show' if args.step is None else args.step}: {there}")
-    try:
-        draw_step(chosen, target, history, title=title, **view)
-    except (OSError, ValueError) as error:  # ValueError: a suffix that matplotlib cannot write
-        raise UserError(f"--output {target}: {error}") from error
+    _draw(chosen, target, history, title=title, **view)
     print(f"{target}: step {chosen.step}, {chosen.total:,} contacts")
+
+
+def _draw(step, target, *history, **options):
+    try:
+        draw_step(step, target, *history, **options)
+    except OSError as error:
+        raise UserError(f"--output {target}: {error.strerror or error}") from error
+    except ValueError as error:  # a suffix that matplotlib cannot write
+        raise UserError(f"--output {target}: {error}") from error
 
 
 def _draw_many(args, steps, folder, title, view):
     count = 0
     for number, step in enumerate(steps):
         if number % args.every == 0:
-            draw_step(step, folder / f"{step.step:06}.png", title=title, **view)
+            _draw(step, folder / f"{step.step:06}.png", title=title, **view)
             count += 1
             if sys.stderr.isatty():
                 print(f"\r{count} drawn ", end="", file=sys.stderr, flush=True)

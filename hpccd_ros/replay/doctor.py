@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from hpccd_ros.bag.examine import Examination, examine
-from hpccd_ros.bag.reader import Recording, RecordingError, recording_files
+from hpccd_ros.bag.reader import Recording, recording_files
 from hpccd_ros.bag.recover import recover
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import printable
@@ -40,10 +40,7 @@ def _recover(source, args) -> int:
     except OSError as error:
         raise UserError(f"--recover {args.recover}: {error.strerror}") from error
     _print_examination(found)
-    check = examine(args.recover)
-    if not check.sound or check.message_count != found.message_count:
-        raise RecordingError(f"the recovered file {args.recover} is not what was saved: {check.problem}")
-    print(f"saved {check.message_count} messages, {_seconds(check):.3f} s: {args.recover}")
+    print(f"saved {found.message_count} messages, {_seconds(found):.3f} s: {args.recover}")
     return 0
 
 

@@ -18,7 +18,7 @@ from hpccd_ros.base.errors import UserError
 from hpccd_ros.params.parameter_file import read_parameters
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
-from hpccd_ros.replay.report import Summary, write_json
+from hpccd_ros.replay.report import Summary, new_file, write_json
 
 SHOWN = ("file", "result", "steps", "contacts", "core_ms", "host", "why")
 GOOD = ("VERIFIED", "COMPUTED")
@@ -41,11 +41,20 @@ def replay_one(path: str, *, params=None, **options) -> dict:
 def main(args) -> int:
     """Verify as the options of `hpccd replay` say. 0: all equal, 1: not."""
     distributed = extras.require("distributed", "cluster", "replaying many recordings at once")
-    for path in (args.csv, args.json):
-        if path and Path(path).exists():
-            raise UserError(f"{path} exists: existing files are not overwritten")
     if args.params:
         read_parameters(args.params)  # one sentence now rather than one for each recording
+    with new_file("--csv", args.csv) as csv_file, new_file("--json", args.json) as json_file:
+        rows = _rows(distributed, args)
+        if json_file:
+            write_json(json_file, rows)
+        if csv_file:
+            _write_csv(csv_file, rows)
+    _print(rows)
+    return 0 if all(row["result"] in GOOD for row in rows) else 1
+
+
+def _rows(distributed, args) -> list[dict]:
+    """What came of each recording, in the order in which they were given."""
     paths = [str(Path(path).absolute()) for path in args.files]
     with _cluster(distributed, args, len(paths)) as (client, threads):
         options = {
@@ -58,13 +67,7 @@ def main(args) -> int:
             "end": args.end,
         }
         futures = [client.submit(replay_one, path, pure=False, **options) for path in paths]
-        rows = _gather(distributed, futures, paths)
-    _print(rows)
-    if args.json:
-        write_json(args.json, rows)
-    if args.csv:
-        _write_csv(args.csv, rows)
-    return 0 if all(row["result"] in GOOD for row in rows) else 1
+        return _gather(distributed, futures, paths)
 
 
 @contextlib.contextmanager
@@ -144,11 +147,8 @@ def _print(rows) -> None:
 
 def _write_csv(path, rows) -> None:
     columns = list(dict.fromkeys(name for row in rows for name in row))
-    try:
-        with open(path, "x", newline="", encoding="utf-8") as stream:
-            writer = csv.DictWriter(stream, columns)
-            writer.writeheader()
-            lists = ("accuracy", "separation", "features")
-            writer.writerows(row | {name: " ".join(row.get(name, [])) for name in lists} for row in rows)
-    except OSError as error:
-        raise UserError(f"--csv {path}: {error.strerror}") from error
+    with open(path, "w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, columns)
+        writer.writeheader()
+        lists = ("accuracy", "separation", "features")
+        writer.writerows(row | {name: " ".join(row.get(name, [])) for name in lists} for row in rows)

@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from hpccd_core.options import FEATURES
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.frames.drops import Reason
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.pacing import Pace, next_wanted
@@ -43,14 +44,27 @@ COLUMNS = (
 )
 
 
+@contextlib.contextmanager
+def new_file(option: str, path):
+    """`whole_file`, or None where no file is asked for. Raises UserError naming the option, before anything is computed
+    where the file exists or its folder does not."""
+    if not path:
+        yield None
+        return
+    try:
+        with whole_file(path) as draft:
+            yield draft
+    except OSError as error:
+        if error.filename != str(path):
+            raise  # of another file
+        raise UserError(f"{option} {path}: {error.strerror or error}; existing files are not overwritten") from error
+
+
 class Table:
     """One row of text for each step, into a CSV file."""
 
     def __init__(self, path):
-        try:
-            self._file = open(path, "x", newline="", encoding="utf-8")
-        except OSError as error:
-            raise UserError(f"--csv {path}: {error.strerror}; existing files are not overwritten") from error
+        self._file = open(path, "w", newline="", encoding="utf-8")
         self._writer = csv.writer(self._file)
         self._writer.writerow(COLUMNS)
 
@@ -86,12 +100,9 @@ class Table:
 
 
 def write_json(path, rows) -> None:
-    """Write the rows of a report into a new file."""
-    try:
-        with open(path, "x", encoding="utf-8") as stream:
-            json.dump(rows, stream, indent=1)
-    except OSError as error:
-        raise UserError(f"--json {path}: {error.strerror}; existing files are not overwritten") from error
+    """Write the rows of a report."""
+    with open(path, "w", encoding="utf-8") as stream:
+        json.dump(rows, stream, indent=1)
 
 
 def main(args) -> int:
@@ -99,7 +110,10 @@ def main(args) -> int:
     with contextlib.ExitStack() as stack:
         recording = stack.enter_context(Recording(args.file))
         setup = recorded_setup.of_recording(recording, args.params)
-        table = stack.enter_context(contextlib.closing(Table(args.csv))) if args.csv else None
+        csv_file, json_file = (
+            stack.enter_context(new_file(*named)) for named in (("--csv", args.csv), ("--json", args.json))
+        )
+        table = stack.enter_context(contextlib.closing(Table(csv_file))) if csv_file else None
         progress = stack.enter_context(_progress_bar())
         replay = Replay(
             recording,
@@ -132,12 +146,12 @@ def main(args) -> int:
                 if not next_wanted(f"{step.at:.3f} s"):
                     break
         progress.update(bar, line="")
+        if json_file:
+            write_json(json_file, [summary.row(args.file, replay)])
     for note in recording.notes:
         print(note, file=sys.stderr)
     for name in setup.unknown:
         print(f"parameter {name} is unknown and has no effect", file=sys.stderr)
-    if args.json:
-        write_json(args.json, [summary.row(args.file, replay)])
     summary.print(args, recording, replay)
     failed = any(part.diverged or part.unverified for part in (replay, replay.distances))
     return 1 if failed or not summary.computed else 0

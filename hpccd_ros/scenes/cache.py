@@ -6,7 +6,6 @@ from __future__ import annotations
 import hashlib
 import inspect
 import os
-import tempfile
 import warnings
 import zipfile
 from collections.abc import Callable
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.scenes import exactmath
 
 
@@ -44,15 +44,8 @@ def cached(
     arrays = simulate()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        # Written aside and renamed: another process sees the whole file or none.
-        descriptor, aside = tempfile.mkstemp(dir=path.parent, suffix=".part")
-        try:
-            with os.fdopen(descriptor, "wb") as file:
-                np.savez(file, **arrays)
-            os.replace(aside, path)
-        except BaseException:
-            os.unlink(aside)
-            raise
+        with whole_file(path, overwrite=True) as draft:  # another process sees the whole file or none
+            np.savez(draft, **arrays)
     except OSError as error:
         warnings.warn(f"scene {name} is not cached: {error}", stacklevel=2)
     return arrays

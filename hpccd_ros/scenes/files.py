@@ -11,6 +11,7 @@ import yaml
 from hpccd_ros.bag.qos_yaml import INFINITE
 from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.base.version import package_version
+from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.scenes import messages
 from hpccd_ros.scenes.progress import track
 from hpccd_ros.scenes.scene import Scene
@@ -23,7 +24,8 @@ def write_mcap(scene: Scene, path: str | Path, rate: float, compression: str = "
     """Write all frames, `rate` a second, as `hpccd record` would have recorded them: topologies and vertices, of robots
     the description and the joint states.
 
-    FileExistsError where `path` exists; LookupError where the package hpccd is not installed.
+    Raises FileExistsError where `path` exists, OSError where the disk refuses, LookupError where the package hpccd is
+    not installed.
     """
     info = {
         "format": 1,
@@ -37,17 +39,21 @@ def write_mcap(scene: Scene, path: str | Path, rate: float, compression: str = "
     for topic in messages.topics(scene):
         topics.append(Topic("/" + topic.name, topic.type_name, [_offered(topic.latched)], topic.latched))
         info["topics"]["/" + topic.name] = topic.name
-    bag = BagWriter(path, info=info, compression=compression)
-    try:
-        for topic in topics:
-            bag.add_topic(topic)
-        player = messages.Player(scene)
-        for frame in track(scene.frames(), f"writing {path}", progress, scene.n_frames):
-            stamp = FIRST_STAMP_NS + round(frame.index * 1e9 / rate)
-            for message in player.messages(frame, stamp):
-                bag.write("/" + message.topic, message.data, stamp, stamp)
-    finally:
-        bag.close()
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(path) as draft:
+        bag = BagWriter(draft, info=info, compression=compression)
+        try:
+            for topic in topics:
+                bag.add_topic(topic)
+            player = messages.Player(scene)
+            for frame in track(scene.frames(), f"writing {path}", progress, scene.n_frames):
+                stamp = FIRST_STAMP_NS + round(frame.index * 1e9 / rate)
+                for message in player.messages(frame, stamp):
+                    bag.write("/" + message.topic, message.data, stamp, stamp)
+        finally:
+            bag.close()
+        if bag.write_errors:
+            raise OSError(f"{path}: {bag.last_error.partition(':')[0]}")
 
 
 def _offered(latched: bool) -> dict:
@@ -111,7 +117,7 @@ def write_step(scene: Scene, index: int, path: str | Path) -> None:
 
 def _save(path, arrays):
     # numpy appends .npz to a name without it; an open file keeps the name that was asked for.
-    with open(path, "xb") as file:
+    with whole_file(path) as draft, open(draft, "wb") as file:
         np.savez(file, **arrays)
 
 
@@ -125,5 +131,5 @@ def write_parameters(scene: Scene, path: str | Path) -> None:
             branch = branch.setdefault(folder, {})
         branch[last] = value
     text = yaml.safe_dump({"/**": {"ros__parameters": tree}}, sort_keys=False)
-    with open(path, "x", encoding="utf-8") as file:
-        file.write(f"# The meshes of the scene {scene.name}.\n{text}")
+    with whole_file(path) as draft:
+        draft.write_text(f"# The meshes of the scene {scene.name}.\n{text}", encoding="utf-8")

@@ -10,6 +10,7 @@ import numpy as np
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import shortened
+from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.picture.contacts import BACKGROUND, FAINT, INK, MESH_COLOURS, TINT, TOC_COLOURS
 from hpccd_ros.picture.of_recording import facts
 from hpccd_ros.picture.page.document import document, three
@@ -191,6 +192,21 @@ def write_page(args, source: Path, target: Path, title: str, view: dict) -> int:
     if not target.parent.is_dir():
         raise UserError(f"--html {target}: there is no folder {target.parent}")
     every = args.every or 1
+    try:
+        with whole_file(target, overwrite=True) as draft:
+            page = _page_of(args, source, title, view, every)
+            draft.write_text(document(*page.described(), library), encoding="utf-8", newline="\n")
+    except OSError as error:
+        if error.filename != str(target):
+            raise  # of the recording
+        raise UserError(f"--html {target}: {error.strerror}") from error
+    size = target.stat().st_size
+    advice = f"; --every {2 * every} makes it smaller" if size > LARGE and args.step is None else ""
+    print(f"{target}: {page.steps} step{'' if page.steps == 1 else 's'}, {size / 1e6:.1f} MB{advice}")
+    return 0
+
+
+def _page_of(args, source, title, view, every) -> RecordingPage:
     with Recording(source) as recording:
         setup = recorded_setup.of_recording(recording, args.params)
         replay = Replay(recording, setup, outputs=("points",), distances=False)
@@ -199,12 +215,4 @@ def write_page(args, source: Path, target: Path, title: str, view: dict) -> int:
             page.add(step, step.step == args.step if args.step is not None else number % every == 0)
         if not page.steps:
             raise UserError(f"{source}: no step{'' if args.step is None else f' {args.step}'} that can be shown")
-        text = document(*page.described(), library)
-    try:
-        target.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise UserError(f"--html {target}: {error.strerror}") from error
-    size = target.stat().st_size
-    advice = f"; --every {2 * every} makes it smaller" if size > LARGE and args.step is None else ""
-    print(f"{target}: {page.steps} step{'' if page.steps == 1 else 's'}, {size / 1e6:.1f} MB{advice}")
-    return 0
+    return page

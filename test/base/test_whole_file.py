@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A file appears whole, or not at all: whatever ends the writer, an earlier file stays and nothing lies beside it."""
+
+import errno
+import os
+import signal
+import threading
+
+import pytest
+
+from hpccd_ros.base import whole_file as module
+from hpccd_ros.base.whole_file import whole_file
+
+
+def _names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.mark.parametrize("overwrite", [True, False])
+def test_content_appears_when_the_block_ends(tmp_path, overwrite):
+    path = tmp_path / "run.png"
+    with whole_file(path, overwrite=overwrite) as draft:
+        assert draft.name == "run.png", "writers read the format from the name"
+        draft.write_text("new")
+        assert not path.exists()
+    assert path.read_text() == "new" and _names(tmp_path) == ["run.png"]
+    assert path.stat().st_mode & 0o777 == 0o666 & ~_umask()
+
+
+def _umask():
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def test_an_earlier_file_is_replaced_with_its_permissions(tmp_path):
+    path = tmp_path / "run.png"
+    path.write_text("old")
+    path.chmod(0o640)
+    with whole_file(path, overwrite=True) as draft:
+        draft.write_text("new")
+        assert path.read_text() == "old"
+    assert path.read_text() == "new" and path.stat().st_mode & 0o777 == 0o640 and _names(tmp_path) == ["run.png"]
+
+
+def test_an_earlier_file_is_not_replaced_unless_asked_for(tmp_path):
+    path = tmp_path / "run.mcap"
+    path.write_text("old")
+    with pytest.raises(FileExistsError) as refused, whole_file(path):
+        pytest.fail("nothing is written")
+    assert refused.value.filename == str(path)
+    assert path.read_text() == "old" and _names(tmp_path) == ["run.mcap"]
+
+
+@pytest.mark.parametrize("links", [True, False], ids=["links", "no-links"])
+def test_nor_is_one_that_was_made_meanwhile(tmp_path, monkeypatch, links):
+    def no_links(*_):
+        raise OSError(errno.EPERM, "no hard links here")
+
+    if not links:
+        monkeypatch.setattr(module.os, "link", no_links)
+    path = tmp_path / "run.mcap"
+    with pytest.raises(FileExistsError) as refused, whole_file(path) as draft:
+        draft.write_text("new")
+        path.write_text("of another process")
+    assert refused.value.filename == str(path)
+    assert path.read_text() == "of another process" and _names(tmp_path) == ["run.mcap"]
+    path.unlink()
+    with whole_file(path) as draft:
+        draft.write_text("new")
+    assert path.read_text() == "new" and _names(tmp_path) == ["run.mcap"]
+
+
+@pytest.mark.parametrize("overwrite", [True, False])
+@pytest.mark.parametrize("failure", [ValueError, KeyboardInterrupt, "signal", OSError])
+def test_a_failure_leaves_what_was_there(tmp_path, overwrite, failure):
+    path = tmp_path / "run.png"
+    if overwrite:
+        path.write_text("old")
+    expected = KeyboardInterrupt if failure == "signal" else failure
+    with pytest.raises(expected), whole_file(path, overwrite=overwrite) as draft:
+        draft.write_text("half")
+        if failure == "signal":
+            signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+            threading.Event().wait(60)
+        raise failure
+    assert _names(tmp_path) == ["run.png"] * overwrite
+    assert not overwrite or path.read_text() == "old"
+
+
+def test_errors_name_the_file_and_not_the_draft(tmp_path):
+    path = tmp_path / "run.png"
+    with pytest.raises(OSError) as failed, whole_file(path) as draft:
+        open(draft / "in a file that is no folder", "w")
+    assert failed.value.filename == str(path)
+    with pytest.raises(FileNotFoundError) as missing, whole_file(tmp_path / "no" / "run.png"):
+        pytest.fail("there is no such folder")
+    assert missing.value.filename == str(tmp_path / "no" / "run.png")
+    with pytest.raises(OSError) as other, whole_file(path):
+        open(tmp_path / "another file")
+    assert other.value.filename == str(tmp_path / "another file")
+    assert _names(tmp_path) == []
+
+
+def test_a_link_stays_and_its_file_is_replaced(tmp_path):
+    (tmp_path / "kept").mkdir()
+    path, target = tmp_path / "latest.png", tmp_path / "kept" / "run.png"
+    path.symlink_to(target)
+    for text in ("first", "second"):
+        with whole_file(path, overwrite=True) as draft:
+            draft.write_text(text)
+        assert path.is_symlink() and target.read_text() == text
+
+
+def test_a_pipe_is_written_to_directly(tmp_path):
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    read = []
+    reader = threading.Thread(target=lambda: read.append(path.read_text()))
+    reader.start()
+    with whole_file(path, overwrite=True) as draft:
+        draft.write_text("streamed")
+    reader.join()
+    assert read == ["streamed"] and _names(tmp_path) == ["pipe"]
