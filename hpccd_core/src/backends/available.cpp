@@ -17,7 +17,7 @@ bool wanted(Backend backend, const char* name, const std::string& unsupported, c
   return true;
 }
 
-// Not even what the CPU computes could be brought to a device that is not there.
+// Without a device, not even results of the CPU could be copied to it.
 void require_device_for_results(const Options& o) {
   if (o.results_on_device && gpu::status().devices.empty())
     throw InvalidArgument("results_on_device: needs a usable GPU, and there is none here (" + gpu::status().reason +

@@ -16,21 +16,21 @@ namespace hpccd {
 
 class AvailableBackends {
  public:
-  // Throws InvalidArgument where the options ask for a backend that is not usable, or for results on a device that is
-  // not there.
+  // Throws InvalidArgument if the options select a backend that is not usable, or results on a device without a usable
+  // device.
   explicit AvailableBackends(Resources& shared);
 
-  // It takes all worlds.
+  // The backend, for all worlds.
   DetectionBackend& at(Backend backend);
   GpuBackend& gpu() { return gpu_.value(); }
-  // Whether it is here, and its devices have not failed too often.
+  // Whether the backend exists and its devices have not failed too often.
   bool works(Backend backend) const;
   bool use_devices() const { return gpu_ || hybrid_; }
   bool take_device_arrays() const { return gpu_.has_value(); }
-  // Host arrays with the same positions. which: 0 or 1, the place where a copy is kept.
+  // Host arrays with the same positions. which: 0 or 1, the buffer for the copy.
   Positions on_host(Positions p, int which) { return gpu_ ? gpu_->on_host(p, which) : p; }
 
-  // Of a last step for which this one was asked.
+  // Adds the counts of the last step, for which this backend was requested.
   void count(Backend asked, std::map<std::string, std::uint64_t>& stats);
   // Why a step was left to the CPU.
   std::string last_error() const;
@@ -39,7 +39,7 @@ class AvailableBackends {
   CpuBackend cpu_;
   std::optional<GpuBackend> gpu_;
   std::optional<HybridBackend> hybrid_;
-  // Of several worlds, what makes of those that take one backends that take all.
+  // For several worlds: adapters from backends for one world to backends for all.
   std::optional<WorldMemories> memories_;
   std::optional<WorldsOnCpus> worlds_on_cpus_;
   std::optional<OneByOne> worlds_on_hybrid_;

@@ -16,27 +16,27 @@ namespace hpccd {
 
 struct Detection {
   Contacts contacts;
-  Backend computed_by;  // the CPU, too, where it did what failing devices left undone
+  Backend computed_by;  // also the CPU, if it completed the work of failed devices
 };
 
 class DetectionBackend {
  public:
   virtual ~DetectionBackend() = default;
 
-  // Nothing where the backend failed: the CPU shall compute the step. Positions may be on a device for the GPU only.
-  // Throws InvalidArgument for bad coordinates, and Cancelled.
+  // Nothing if the backend failed: the CPU must compute the step. Positions may be on a device only for the GPU. Throws
+  // InvalidArgument for invalid coordinates, and Cancelled.
   virtual std::optional<Detection> detect(Positions t0, Positions t1) = 0;
 
-  // By world: the earliest time, of contacts that are reported no later than they are where their tier can; infinity
-  // where there is none. Nothing as well where a backend leaves the query to the CPU.
+  // By world: the earliest time of a contact, never late if the tier promises that; infinity without contacts. Also
+  // nothing if the backend leaves the query to the CPU.
   virtual std::optional<std::vector<double>> earliest(Positions, Positions) { return std::nullopt; }
 
-  // Of one snapshot. Nothing as well where a backend leaves the query to the CPU.
-  virtual std::optional<Contacts> proximity(Positions, double) { return std::nullopt; }  // distances in place of times
+  // For one snapshot. Also nothing if the backend leaves the query to the CPU.
+  virtual std::optional<Contacts> proximity(Positions, double) { return std::nullopt; }  // distances instead of times
   virtual std::optional<Intersections> intersections(Positions) { return std::nullopt; }
   virtual std::optional<std::vector<Gap>> distances(Positions) { return std::nullopt; }
 
-  // Adds what the last step counted, and its stages on a device.
+  // Adds the counts of the last step, and its stages on a device.
   virtual void count(std::map<std::string, std::uint64_t>& stats) const = 0;
   virtual void add_stages(std::map<std::string, double>&) const {}
 

@@ -14,10 +14,10 @@
 namespace hpccd {
 namespace {
 
-// By leaf. A search of the whole tree comes to about eight; more than two, with their boxes and the list, cost as much.
+// Per leaf. A search of the whole tree has about eight; more than two, with their boxes and the list, cost as much.
 constexpr std::size_t most_open = 2;
 
-// While it lives, a search keeps the pairs of leaves that it finds, up to a number, instead of testing them.
+// During its lifetime a search stores the pairs of leaves that it finds, up to a maximum, instead of testing them.
 class OpenPairs {
  public:
   OpenPairs(Search& search, std::vector<Worker>& workers, std::size_t most)
@@ -82,7 +82,7 @@ FoundContacts take_found(std::vector<Worker>& workers) {
   return found;
 }
 
-// The earliest of two looks, each once: what is listed may lie in leaves that were left open.
+// Joins the earliest contacts of two searches without duplicates: listed pairs may be in leaves that were left open.
 void join_found(FoundContacts found, double earliest, std::vector<Worker>& workers) {
   const FoundContacts others = take_found(workers);
   const auto join = [&](std::vector<Contact>& list, const std::vector<Contact>& more) {
@@ -184,7 +184,7 @@ void CpuBackend::test_leaves_of_tree(const std::vector<LeafPair>& pairs) {
 
 template <class Test>
 void CpuBackend::test_each(const std::vector<LeafPair>& pairs, Test&& test) {
-  constexpr std::size_t grain = 64;  // small beside a segment: all threads share what one leaves
+  constexpr std::size_t grain = 64;  // small compared with a segment: all threads share the remainder of one
   parallel_for(shared_.pool, pairs.size(), grain, [&](std::size_t begin, std::size_t end, int thread) {
     for (std::size_t i = begin; i < end; ++i) test(pairs[i], workers_[static_cast<std::size_t>(thread)]);
   });
@@ -197,7 +197,7 @@ Contacts CpuBackend::collect() {
 }
 
 Contacts CpuBackend::collect(const Search& search, Outputs outputs) {
-  // Handing out the work (five jobs) takes as long as the work on so many.
+  // Distributing the work (five jobs) takes as long as this amount of work.
   constexpr std::size_t few = 1024;
   std::size_t n = 0;
   for (const Worker& w : workers_) n += w.vertex_face.size() + w.edge_edge.size();
@@ -205,7 +205,7 @@ Contacts CpuBackend::collect(const Search& search, Outputs outputs) {
   collect_contacts(workers_, search.geometry, search.report, outputs, order_, n < few ? one_thread_ : shared_.pool,
                    contacts_);
   shared_.profiler.mark("contacts");
-  shared_.cancellation.heed();  // whoever cancelled a call shall not have to look at its answer
+  shared_.cancellation.heed();  // the caller of a cancelled call must not receive its result
   return std::move(contacts_);
 }
 
@@ -230,7 +230,7 @@ void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
 void CpuBackend::begin_worlds() { counts_of_worlds_.emplace(); }
 
 void CpuBackend::begin_world(WorldMemory& memory, TreeBudget& trees) {
-  // Of several contacts any may be the one that is found, but the same one as by a detector of this world alone.
+  // Any of several contacts may be returned, but it must be the one that a detector of this world alone returns.
   shared_.tree.begin_world(memory.tree, trees, shared_.options.report == Report::any);
   std::swap(near_, memory.near);
 }
@@ -292,8 +292,8 @@ void CpuBackend::fit_snapshot(Positions vertices, double distance) {
   counts_ = {};
 }
 
-// The earliest contacts. Pairs known to be near give the best time so far at once, and often the answer; else the tree
-// is searched for what may touch before.
+// The earliest contacts. Near pairs give a best time immediately, and often the result; otherwise the tree is searched
+// for pairs that may touch before.
 
 std::optional<std::vector<double>> CpuBackend::earliest(Positions t0, Positions t1) {
   find_earliest(t0, t1, true);
@@ -301,7 +301,7 @@ std::optional<std::vector<double>> CpuBackend::earliest(Positions t0, Positions 
   return std::vector<double>{search_->earliest};
 }
 
-// Leaves what it found in the workers.
+// Leaves the contacts in the workers.
 void CpuBackend::find_earliest(Positions t0, Positions t1, bool time_only) {
   begin_earliest(t0, t1, time_only);
   if (search_->prunes) {
@@ -332,7 +332,7 @@ void CpuBackend::begin_earliest(Positions t0, Positions t1, bool time_only) {
   search_->prunes = shared_.rules.promise_times();
 }
 
-// Tests the pairs that are near, and says whether that was enough. The best time so far is known then in any case.
+// Tests the near pairs; returns whether they were sufficient. The best time so far is known in any case.
 bool CpuBackend::answer_from_near_pairs() {
   if (const std::uint64_t now = shared_.separations.version(); near_.radius().separations != now)
     near_ = {}, near_.radius().separations = now, drift_of_.reset();
@@ -344,11 +344,11 @@ bool CpuBackend::answer_from_near_pairs() {
   return near_.radius().answers(search_->earliest, travel_);
 }
 
-// Leaves what it found in the workers, and nothing else.
+// Leaves the contacts in the workers, and changes nothing else.
 void CpuBackend::test_groups(const std::vector<NearList::Group>& groups) {
   for (Worker& w : workers_) w.begin(*search_);
   for (const NearList::Group& group : groups) {
-    constexpr std::size_t grain = 256;  // 10 us, as long as it takes to wake a thread
+    constexpr std::size_t grain = 256;  // 10 us, the time to wake a thread
     parallel_for(shared_.pool, group.first.size(), grain, [&](std::size_t begin, std::size_t end, int thread) {
       const std::span first(group.first), second(group.second);
       workers_[static_cast<std::size_t>(thread)].test_pairs(first.subspan(begin, end - begin),
@@ -357,8 +357,8 @@ void CpuBackend::test_groups(const std::vector<NearList::Group>& groups) {
   }
 }
 
-// Lists all pairs that the motion can bring together up to the best time so far, where these are few and asked for
-// again. True: it looked, found few or not, and the motion is to be seen again.
+// Lists all pairs that the motion can bring together up to the best time so far, if they are few and needed again.
+// True: it has searched, successfully or not, and the motion must be bounded again.
 bool CpuBackend::list_near_pairs(Positions t0) {
   NearRadius& list = near_.radius();
   list.edge = typical_length(shared_.features, shared_.tree.motion().vertices);
@@ -386,7 +386,7 @@ bool CpuBackend::list_near_pairs(Positions t0) {
   return true;
 }
 
-// Some of the earliest contacts: they give the next motion its first bound.
+// Keeps some of the earliest contacts as hints: they give the next motion its first bound.
 void CpuBackend::remember_earliest() {
   constexpr std::size_t enough = 64;
   Grouping near(shared_.features, shared_.rules);
@@ -399,11 +399,11 @@ void CpuBackend::remember_earliest() {
   near_.hints = std::move(near.groups);
 }
 
-// What a list of near pairs leaves open where the motion goes farther than it reaches: pairs of leaves that go apart by
-// more. On meshes that hang together these are few, and only their boxes are looked at.
+// Pairs that a list of near pairs leaves open if the motion goes farther than its radius: pairs of leaves that move
+// apart by more. On connected meshes these are few, and only their boxes are compared.
 
-// After the pairs of the list: what it leaves open. False where that is too much, where there is no list, or no tree to
-// look with: a world takes its list along to whatever thread's tree is there.
+// After the pairs of the list: the open ones. False if they are too many, if there is no list, or no tree to search: a
+// world keeps its list when it moves to another thread's tree.
 bool CpuBackend::answer_from_unlisted_pairs(bool time_only) {
   if (!shared_.tree.built()) return false;
   if (!near_.radius().known() || near_.snapshot().size() != shared_.tree.motion().vertices.size()) return false;
@@ -425,11 +425,11 @@ bool CpuBackend::answer_from_unlisted_pairs(bool time_only) {
   return true;
 }
 
-// The radius of a list that leaves little open of this motion.
+// The radius of a list that leaves few pairs of this motion open.
 std::optional<double> CpuBackend::wide_radius() {
   near_.begin_at(shared_.tree.motion().vertices, shared_.pool);
   update_drift();
-  constexpr double longest = 0.6;  // of an edge; at 0.7 all neighbours of a regular mesh are near
+  constexpr double longest = 0.6;  // of an edge; with 0.7 all neighbours of a regular mesh are near
   const std::size_t n_leaves = shared_.tree.tree().leaves.size();
   for (const double part : {0.25, 0.4, longest}) {
     drift_.listed_within(part * near_.radius().edge, shared_.separations.most());
@@ -443,14 +443,14 @@ std::optional<double> CpuBackend::wide_radius() {
 void CpuBackend::update_drift() {
   const Tree& tree = shared_.tree.tree();
   if (const std::pair now(near_.number(), shared_.tree.number()); drift_of_ != now) {
-    drift_of_.reset();  // should this be cancelled
+    drift_of_.reset();  // in case this is cancelled
     drift_.begin(tree, near_.snapshot(), shared_.pool);
     drift_of_ = now;
   }
   drift_.fit(tree, shared_.tree.motion().vertices, near_.snapshot(), shared_.pool);
 }
 
-// Pairs of leaves that may touch and are not all listed; nothing where there are too many.
+// Pairs of leaves that may touch and are not all listed; nothing if there are too many.
 std::optional<std::vector<LeafPair>> CpuBackend::open_pairs() {
   const OpenPairs open(*search_, workers_, most_open * shared_.tree.tree().leaves.size());
   search_->traverse_unlisted(drift_, shared_.pool, workers_);

@@ -23,25 +23,26 @@ class CpuBackend final : public DetectionBackend {
   std::optional<Detection> detect(Positions t0, Positions t1) override;
   void count(std::map<std::string, std::uint64_t>& stats) const override;
 
-  // By the default traversal, whatever the method.
+  // By the default traversal, whatever the method is.
   std::optional<std::vector<double>> earliest(Positions t0, Positions t1) override;
   std::optional<Contacts> proximity(Positions vertices, double distance) override;
   std::optional<Intersections> intersections(Positions vertices) override;
   std::optional<std::vector<Gap>> distances(Positions vertices) override;
 
-  // Of several worlds: at the beginning of a call, and around what one of them asks. count() is of all since then.
+  // For several worlds: at the beginning of a call, and before and after each world. count() covers all worlds since
+  // then.
   void begin_worlds();
   void begin_world(WorldMemory& memory, TreeBudget& trees);
   void end_world(WorldMemory& memory);
 
-  // In this order in each step; the workers hold what was found when it is collected. Devices find all contacts, and
-  // test "fast" as "balanced": beside them the CPU does so as well.
+  // Called in this order in each step; the workers hold the contacts until they are collected. Devices find all
+  // contacts, and test "fast" as "balanced": beside devices the CPU does the same.
   enum class Tests : bool { all_here, beside_devices };
   void update(Positions t0, Positions t1, Tests tests);
   void traverse();
   Contacts collect();
 
-  // The elementary tests of pairs of leaves that a traversal named, of the tree or of a published method's hierarchy.
+  // Runs the elementary tests of pairs of leaves from a traversal, of the tree or of a published method's hierarchy.
   void test(const std::vector<LeafPair>& pairs);
   void test_leaves_of_tree(const std::vector<LeafPair>& pairs);
   bool walks_tree() const { return method_ == nullptr; }
@@ -72,21 +73,22 @@ class CpuBackend final : public DetectionBackend {
 
   Resources& shared_;
   ThreadPool one_thread_{1};
-  std::unique_ptr<paper::MethodEngine> method_;  // published; none for the default traversal
+  std::unique_ptr<paper::MethodEngine> method_;  // published method; null for the default traversal
   const std::vector<Box>* swept_ = nullptr;      // for a published method
   std::vector<Worker> workers_;
   std::optional<ContactSearch> search_;  // of the last motion
-  WorkCounts counts_;                    // what the last query counts, without its numbers
+  WorkCounts counts_;                    // counts of the last query, without its numbers
   ContactOrder order_;
   NearList near_;                        // for the earliest contacts of motions that begin alike
-  Drift drift_;                          // from where it was made
-  Travel travel_;                        // of the motion, as the list sees it
-  std::optional<MeshPairs> mesh_pairs_;  // from the first search for smallest distances on
-  // What the drift begins at: the numbers of that snapshot and of the tree.
+  Drift drift_;                          // of the snapshot of the list
+  Travel travel_;                        // of the motion, relative to the list
+  std::optional<MeshPairs> mesh_pairs_;  // created by the first search for smallest distances
+  // The start of the drift: the numbers of that snapshot and of the tree.
   std::optional<std::pair<std::uint64_t, std::uint64_t>> drift_of_;
-  // Kept by a call that is cancelled: to give the memory of 10 million back to the system takes longer than to end it.
+  // Kept after a cancelled call: returning the memory of 10 million contacts to the system takes longer than ending the
+  // call.
   Contacts contacts_;
-  std::optional<WorkCounts> counts_of_worlds_;  // none for a detector of one
+  std::optional<WorkCounts> counts_of_worlds_;  // null for a detector of one world
 };
 
 }  // namespace hpccd

@@ -6,7 +6,7 @@
 
 namespace hpccd {
 
-// The steps that a backend's devices have failed in.
+// Counts the steps in which a backend's devices have failed.
 class Failures {
  public:
   void succeeded() { in_a_row_ = 0; }
@@ -18,8 +18,8 @@ class Failures {
 
   std::uint64_t count() const { return count_; }
   const std::string& last() const { return last_; }
-  // One failure may pass, as when another process held the memory. What fails three times in a row is left alone: each
-  // attempt costs its time and then the CPU's.
+  // One failure may be temporary, as when another process held the memory. After three failures in a row the device is
+  // no longer used: each attempt costs its time in addition to the CPU's.
   bool gave_up() const { return in_a_row_ >= 3; }
 
  private:

@@ -18,8 +18,8 @@
 namespace hpccd {
 namespace {
 
-// The same for boxes grown by nearly the same, of which a tree is worn out alike: within an eighth of a factor of two
-// areas differ by a fifth at most. Who asks for another distance in each frame has worn out trees too.
+// The same number for boxes grown by nearly the same distance, for which trees degrade alike: within an eighth of a
+// factor of two, areas differ by at most a fifth. With a new distance in each frame, degraded trees are detected too.
 int growth_of(double distance) {
   return distance > 0 ? static_cast<int>(std::floor(8 * std::log2(distance))) : std::numeric_limits<int>::min();
 }
@@ -39,7 +39,7 @@ std::string GpuBackend::unsupported(const Options& options) {
   return "";
 }
 
-// What the device computes with the CPU beside it, or nothing after a failure.
+// Runs a computation of the device, or returns nothing after a failure.
 template <class Compute>
 auto GpuBackend::attempt(Compute&& compute) -> std::optional<decltype(compute())> {
   places_on_cpu_ = 0;
@@ -50,7 +50,7 @@ auto GpuBackend::attempt(Compute&& compute) -> std::optional<decltype(compute())
     return found;
   } catch (const gpu::Error& e) {
     failures_.failed(e.what());
-    has_tree_ = false;  // nothing on the device is relied on after a failure
+    has_tree_ = false;  // nothing on the device is valid after a failure
     near_.forget();
     shared_.profiler.mark("gpu_failed");
     return std::nullopt;
@@ -113,13 +113,13 @@ std::optional<DeviceResults> GpuBackend::intersections_on_device(Positions verti
   });
 }
 
-// Those on a device are not looked at.
+// Positions on a device are not checked.
 void GpuBackend::require_rest(Positions t0, Positions t1) const {
   if (t0.on_device || t1.on_device) return;
   each_world([&](std::size_t k) { require_static_meshes_rest(*shared_.scene, of_world(t0, k), of_world(t1, k)); });
 }
 
-// f(), whose errors name the world where there are several.
+// Calls f(), whose errors name the world if there are several.
 template <class Function>
 void GpuBackend::in_world(std::size_t world, Function&& f) const {
   try {
@@ -130,7 +130,7 @@ void GpuBackend::in_world(std::size_t world, Function&& f) const {
   }
 }
 
-// f(world), likewise.
+// The same for f(world).
 template <class Function>
 void GpuBackend::each_world(Function&& f) const {
   for (std::size_t k = 0; k < n_worlds(); ++k) in_world(k, [&] { f(k); });
@@ -142,7 +142,7 @@ void GpuBackend::prepare_motion(Positions t0, Positions t1, bool until_best) {
           [&] { shared_.tree.bound(on_host(of_world(t0, 0), 0), on_host(of_world(t1, 0), 1), {}); });
 }
 
-// Throws where the device has found bad coordinates, and names them.
+// Throws if the device has found invalid coordinates, and names them.
 void GpuBackend::require_good(bool good, Positions t0, Positions t1) {
   if (!good) {
     t0 = on_host(t0, 0), t1 = on_host(t1, 1);
@@ -152,7 +152,7 @@ void GpuBackend::require_good(bool good, Positions t0, Positions t1) {
   shared_.profiler.mark("gpu");
 }
 
-// Where nothing matters after a time, up to that, and up to the first contact at the start.
+// If contacts after a time do not matter, decides up to that time, and up to the first contact at the start.
 void GpuBackend::decide_motion(Positions t0, Positions t1, std::optional<double> until) {
   if (!pipeline_->undecided().empty()) t0 = on_host(t0, 0), t1 = on_host(t1, 1);
   const Separations separations = shared_.separations_now();
@@ -169,7 +169,7 @@ void GpuBackend::decide_motion(Positions t0, Positions t1, std::optional<double>
   });
 }
 
-// What was found is on the device, or decided by the CPU.
+// All contacts are on the device, or decided by the CPU.
 void GpuBackend::run_contacts(Positions t0, Positions t1) {
   const bool prunes = shared_.options.report == Report::first && shared_.rules.promise_times() && n_worlds() == 1;
   prepare_motion(t0, t1, prunes);
@@ -225,7 +225,7 @@ Intersections GpuBackend::pierced_faces(Positions vertices) {
   return found;
 }
 
-// Of many worlds the device joins what the CPU has decided.
+// For many worlds, the device merges the CPU's decisions.
 Contacts GpuBackend::finish_on_host(Report report) {
   if (n_worlds() > 1) return contacts_of(finish_on_device(), n_worlds(), shared_.pool);
   Contacts found = join(finish(), decided_, shared_.features, shared_.pool);
@@ -289,7 +289,8 @@ void GpuBackend::run_snapshot(gpu::Query query, Positions vertices, double dista
   shared_.profiler.mark("gpu");
 }
 
-// A pipeline, and a tree: a new one for the first call, and where refitting on the device has lost too much.
+// Provides a pipeline and a tree: a new one for the first call, and when refitting on the device has degraded it too
+// much.
 template <class Bound>
 void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
   if (!pipeline_) {
@@ -300,29 +301,30 @@ void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
   const bool worn = has_tree_ && worn_out_on_device();
   last_boxes_ = boxes;
   if (has_tree_ && !worn) return;
-  has_tree_ = false;  // should this fail
+  has_tree_ = false;  // in case this fails
   in_world(0, bound);
   shared_.tree.build_anew();
   near_.edge = typical_length(shared_.features, shared_.tree.motion().vertices);
   pipeline_->set_tree(shared_.tree.tree());
-  area_when_built_.clear();  // known when the device has refitted it
+  area_when_built_.clear();  // known once the device has refitted the tree
   has_tree_ = true;
   shared_.profiler.mark("build");
 }
 
-// By the last frame, against the first one whose boxes were of the same kind.
+// Compares the last frame with the first one whose boxes were of the same kind.
 bool GpuBackend::worn_out_on_device() {
   const double area = pipeline_->relative_area();
-  if (!(area > 0)) return false;  // the frame was refused
+  if (!(area > 0)) return false;  // the frame was rejected
   return worn_out(area, area_when_built_.try_emplace(last_boxes_, area).first->second);
 }
 
-// What neither the device nor its error bounds could decide: decide(pair) is its time or its distance, or nothing.
+// Pairs that neither the device nor its error bounds could decide: decide(pair) returns its time or distance, or
+// nothing.
 template <class Decide>
 void GpuBackend::decide(Decide&& decide) {
   const std::vector<Candidate>& undecided = pipeline_->undecided();
   std::vector<std::optional<double>> values(undecided.size());
-  constexpr std::size_t pairs_a_piece = 8;  // about 10 us, as long as it takes to wake a thread
+  constexpr std::size_t pairs_a_piece = 8;  // about 10 us, the time to wake a thread
   parallel_for(shared_.pool, undecided.size(), pairs_a_piece, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) values[i] = decide(undecided[i]);
   });
@@ -366,8 +368,8 @@ void GpuBackend::add_stages(std::map<std::string, double>& stages) const {
   for (const auto& [name, ms] : pipeline_->stages()) stages["gpu/" + name] = ms;
 }
 
-// The earliest contact, as CpuBackend finds it: from pairs known to be near, which stay on the device. Where these do
-// not suffice, from all pairs: a frame without its results, whose boxes reach up to the best time so far.
+// The earliest contact, as in CpuBackend: from near pairs, which stay on the device. If these do not suffice, from all
+// pairs, in a frame without results, whose boxes reach up to the best time so far.
 
 using Pairs = gpu::Pipeline::Pairs;
 
@@ -391,7 +393,7 @@ double GpuBackend::earliest_time(Positions t0, Positions t1) {
   return time;
 }
 
-// Where a world is alone its search is pruned: the times are the same.
+// The search of a single world is pruned; the times are the same.
 std::vector<double> GpuBackend::earliest_times(Positions t0, Positions t1) {
   prepare_motion(t0, t1, false);
   require_good(pipeline_->run_for_earliest(t0, t1, Pairs::all, std::nullopt, shared_.pool), t0, t1);
@@ -416,7 +418,7 @@ double GpuBackend::run_for_earliest(Positions t0, Positions t1, Pairs pairs, gpu
   return time;
 }
 
-// For the motions to come, where these may begin as this one does.
+// Lists near pairs for later motions, if these may begin like this one.
 bool GpuBackend::list_near_pairs(Positions t0, double time, const Travel& travel) {
   if (!near_.next_would_pay(travel)) return false;
   const std::optional<double> radius = near_.next(travel, time);
@@ -436,9 +438,9 @@ Travel GpuBackend::travel_of_frame() const {
   return Travel::along_axes(frame.away, frame.way);
 }
 
-// Points, normals and nearest points of what was found.
+// Points, normals and nearest points of the results.
 
-// By the device, but for the rows that only integers can tell: those by the CPU.
+// Computed on the device, except for rows that only integers can decide, which the CPU computes.
 DeviceResults GpuBackend::with_places(gpu::FrameResult found, Outputs outputs, const Separations& separations,
                                       Positions t0, Positions t1) {
   if (!any(outputs) || found.n_vf + found.n_ee == 0) return on_device(found);
@@ -449,7 +451,7 @@ DeviceResults GpuBackend::with_places(gpu::FrameResult found, Outputs outputs, c
     return all;
   }
   std::vector<PairPlaces> places(open->size());
-  constexpr std::size_t rows_a_piece = 8;  // as of pairs that are left to the CPU
+  constexpr std::size_t rows_a_piece = 8;  // as for pairs that are left to the CPU
   parallel_for(shared_.pool, places.size(), rows_a_piece, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) {
       const gpu::OpenRow& row = (*open)[i];
@@ -476,7 +478,7 @@ void GpuBackend::add_places(Contacts& found, Outputs outputs, const Separations&
     add_places_of_worlds(found, outputs, shared_.features, separations, t0, t1, shared_.pool);
 }
 
-// All by the CPU.
+// All computed by the CPU.
 void GpuBackend::add_places(DeviceResults& found, Outputs outputs, const Separations& separations, Positions t0,
                             Positions t1) {
   places_on_cpu_ = found.n_vf + found.n_ee;
@@ -496,11 +498,11 @@ void GpuBackend::add_places(DeviceResults& found, Outputs outputs, const Separat
   shared_.profiler.mark("places");
 }
 
-// Frames whose work is known beforehand (hpccd/prepared.h).
+// Prepared frames (hpccd/prepared.h).
 
 GpuBackend::Prepared GpuBackend::prepare(Positions t0, Positions t1, double room) {
   Options options = shared_.options;
-  options.gpu_stages = false;  // nobody asks, and marks would pile up
+  options.gpu_stages = false;  // unused, and events would accumulate
   Prepared p;
   p.pipeline = gpu::Pipeline::create(*shared_.scene, shared_.features, options, shared_.separations,
                                      gpu::status().devices.at(0).number);

@@ -27,15 +27,15 @@ class GpuBackend final : public DetectionBackend {
   std::optional<std::vector<double>> earliest(Positions t0, Positions t1) override;
   std::optional<Contacts> proximity(Positions vertices, double distance) override;
   std::optional<Intersections> intersections(Positions vertices) override;
-  // As detect, of one world, without places: rows where the device has written them, or nothing there after all: then
-  // they are in `contacts`. Nothing at all where it failed.
+  // As detect, for one world, without points and normals: rows in the memory that the device has written. If there are
+  // none after all, they are in `contacts`. Nothing if the device failed.
   std::optional<Detected> detect_in_place(Positions t0, Positions t1);
   // The same for results that stay on the device.
   std::optional<DeviceResults> detect_on_device(Positions t0, Positions t1);
   std::optional<DeviceResults> proximity_on_device(Positions vertices, double distance);
   std::optional<DeviceResults> intersections_on_device(Positions vertices);
-  // The same for detect_on_device, of positions on the device: a pipeline of its own, that refers to what the backend
-  // refers to. Throws gpu::Error.
+  // The same as a prepared detection, for positions on the device: a pipeline of its own, which refers to the data of
+  // the backend. Throws gpu::Error.
   struct Prepared {
     std::unique_ptr<gpu::Pipeline> pipeline;
     PreparedResults results;
@@ -43,15 +43,15 @@ class GpuBackend final : public DetectionBackend {
   Prepared prepare(Positions t0, Positions t1, double room);
   void add_stages(std::map<std::string, double>& stages) const override;
 
-  // Host arrays with the same positions. which: 0 or 1, the place where a copy is kept.
+  // Host arrays with the same positions. which: 0 or 1, the buffer for the copy.
   Positions on_host(Positions p, int which);
 
-  // Why it cannot take a detector with these options; empty where it can.
+  // Why the backend does not support these options; empty if it does.
   static std::string unsupported(const Options& options);
 
  private:
-  // What a tree is refitted to: boxes of a query, how large a distance they are grown by (growth_of), and whether they
-  // reach up to the best time so far.
+  // The kind of boxes to which a tree is refitted: boxes of a query, the distance by which they are grown (growth_of),
+  // and whether they reach up to the best time so far.
   struct Boxes {
     gpu::Query query;
     int growth;
@@ -107,12 +107,12 @@ class GpuBackend final : public DetectionBackend {
   Resources& shared_;
   std::unique_ptr<gpu::Pipeline> pipeline_;
   bool has_tree_ = false;
-  // How the device measured the tree when it first refitted it to such boxes.
+  // The device's measure of the tree when it first refitted it to such boxes.
   std::map<Boxes, double> area_when_built_;
   Boxes last_boxes_;
   DecidedContacts decided_;
-  NearRadius near_;                  // of the pipeline's near list; its edge as of when the tree was built
-  std::uint64_t places_on_cpu_ = 0;  // rows whose places the CPU computed for results on the device
+  NearRadius near_;                  // of the pipeline's near list; its edge length when the tree was built
+  std::uint64_t places_on_cpu_ = 0;  // rows with points or normals computed by the CPU, for results on the device
   std::vector<unsigned char> downloaded_[2];
 };
 

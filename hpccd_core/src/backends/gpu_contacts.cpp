@@ -17,7 +17,7 @@ using VertexFace = std::array<std::uint32_t, 2>;
 using EdgeEdge = std::array<std::uint32_t, 4>;
 using EdgeFace = std::array<std::uint32_t, 3>;
 
-// `from` with one more at each of the places in `at` (ascending), by whole runs.
+// A copy of `from` with one more element at each of the positions in `at` (ascending), by whole runs.
 template <class T, class Get>
 std::vector<T> spliced(const T* from, std::size_t n, const std::vector<std::size_t>& at, Get&& get) {
   std::vector<T> all;
@@ -32,7 +32,7 @@ std::vector<T> spliced(const T* from, std::size_t n, const std::vector<std::size
   return all;
 }
 
-// Where each of the rows goes among n others.
+// The position of each row among n others.
 template <class Row, class Get>
 std::vector<std::size_t> places(const Row* among, std::size_t n, std::size_t n_rows, Get&& row) {
   std::vector<std::size_t> at(n_rows);

@@ -16,30 +16,30 @@
 
 namespace hpccd {
 
-// Pairs that a frame leaves to the CPU, where their vertices are in the caller's arrays.
+// Pairs that a frame leaves to the CPU, with vertices from the caller's arrays.
 UndecidedPair undecided_pair(const Features& features, const Separations& separations, const Candidate& pair,
                              Positions t0, Positions t1);
-// Of an edge and a face: both ends, then the corners.
+// For an edge and a face: both ends, then the corners.
 void edge_face_positions(const Features& features, const Candidate& pair, Positions vertices, Vec3<double> q[5]);
 
 // In canonical order.
 struct DecidedContacts {
   std::vector<Contact> vertex_face, edge_edge;
 };
-// Those that have a time or a distance.
+// The pairs that have a time or a distance.
 DecidedContacts decided_contacts(const std::vector<Candidate>& pairs, const std::vector<std::optional<double>>& values);
 
 Contacts join(const gpu::FrameResult& device, const DecidedContacts& decided, const Features& features,
               ThreadPool& pool);
-// Of edges and faces, which the pipeline numbers as vertices and faces.
+// For edges and faces, which the pipeline numbers as vertices and faces.
 Intersections join_intersections(const gpu::FrameResult& device, const DecidedContacts& decided,
                                  const Features& features);
 
-// What a frame of many worlds found, from page-locked memory.
+// The results of a frame of many worlds, from page-locked memory.
 Contacts contacts_of(const gpu::FrameResult& frame, std::size_t n_worlds, ThreadPool& pool);
 Intersections intersections_of(const gpu::FrameResult& frame, std::size_t n_worlds);
 
-// The device finds all contacts: drops what was not asked for.
+// The device finds all contacts: drops those that are not requested.
 void reduce(Contacts& contacts, Report report);
 
 // Positions of one world, or of all.

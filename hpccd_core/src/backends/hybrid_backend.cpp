@@ -10,7 +10,7 @@
 namespace hpccd {
 namespace {
 
-// The first contact in canonical order, where one is enough: which one does not depend on threads or devices.
+// The first contact in canonical order, for report "any": it does not depend on threads or devices.
 void keep_first(std::vector<Worker>& workers) {
   std::vector<Contact> Worker::* const lists[2] = {&Worker::vertex_face, &Worker::edge_edge};
   bool have = false;

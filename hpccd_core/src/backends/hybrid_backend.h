@@ -27,7 +27,7 @@ class HybridBackend final : public DetectionBackend {
   Resources& shared_;
   CpuBackend& cpu_;
   std::unique_ptr<hybrid::Engine> engine_;
-  // For the published methods: each primitive a leaf of its own.
+  // For the published methods: each primitive is a leaf.
   std::vector<LeafRange> primitives_;
   std::vector<std::uint32_t> face_of_primitive_;
 };

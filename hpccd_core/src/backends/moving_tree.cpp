@@ -26,7 +26,7 @@ void MovingTree::fit(Profiler& profiler) {
   profiler.mark("build");
 }
 
-// Whether the tree serves.
+// Whether the tree is usable after a refit.
 bool MovingTree::refitted(Profiler& profiler) {
   if (!kept_.built) return false;
   refit(kept_.tree, motion_, followed_ ? motion_.resting : std::vector<char>(), pool_);
@@ -44,7 +44,7 @@ void MovingTree::fit_leaves(std::span<const std::uint32_t> leaves) {
 
 void MovingTree::build_anew() {
   static std::atomic<std::uint64_t> number{0};
-  fits_ = kept_.built = false;  // should this be cancelled, or find no memory
+  fits_ = kept_.built = false;  // in case this is cancelled or runs out of memory
   kept_.number = ++number;
   build(kept_.tree, scene_, features_, motion_, pool_);
   fits_ = kept_.built = true;
@@ -67,7 +67,7 @@ void MovingTree::give_up_own() {
 }
 
 void MovingTree::begin_world(OwnTree& own, TreeBudget& budget, bool always) {
-  // How large a tree is, the first one tells, which all may share.
+  // The first tree determines the size, which decides whether all worlds may have one.
   own_ = &own, budget_ = &budget, always_own_ = always || (kept_.built && budget.holds_all(kept_.tree.bytes()));
   if (!own.kept && always_own_) own.kept = std::make_unique<KeptTree>();
   if (!own.kept) return;

@@ -14,7 +14,7 @@ constexpr std::size_t grain = 4096;
 
 Vec3<double> at(const double x[3]) { return {x[0], x[1], x[2]}; }
 
-// Not its length, whose square could vanish or overflow.
+// Not the length, whose square could underflow or overflow.
 double largest(const Vec3<double>& x) { return std::max({std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)}); }
 
 std::uint64_t next_number() {

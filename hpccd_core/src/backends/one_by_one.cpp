@@ -20,7 +20,7 @@ bool OneByOne::each_world(const Ask& ask) {
 }
 
 void OneByOne::add_counts() {
-  // What is there, however many worlds there are.
+  // Sizes, which do not add up over worlds.
   static const std::set<std::string> sizes{"bytes", "gpu_bytes", "gpus", "hybrid_most_queued"};
   std::map<std::string, std::uint64_t> counts;
   one_.count(counts);

@@ -12,7 +12,7 @@ namespace hpccd {
 
 class OneByOne final : public WorldByWorld {
  public:
-  // `beside`: the CPU backend that works beside the device, with its memories of the worlds.
+  // `beside`: the CPU backend that works beside the device, with its memory of the worlds.
   OneByOne(Resources& shared, DetectionBackend& one, CpuBackend& beside, WorldMemories& memories)
       : WorldByWorld(shared), one_(one), beside_(beside), memories_(memories) {}
 

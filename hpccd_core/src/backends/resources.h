@@ -15,9 +15,9 @@
 
 namespace hpccd {
 
-// Of all worlds of a detector alike.
+// Shared by all worlds of a detector.
 struct Common {
-  // `threads` as for ThreadPool; the options say how many there are.
+  // `threads` as for ThreadPool; the options contain the actual number.
   Common(std::shared_ptr<const Scene> of, const Options& wanted, int threads);
 
   std::shared_ptr<const Scene> scene;
@@ -28,16 +28,16 @@ struct Common {
   SeparationTable separations;
   PairRules rules;
 
-  // At the beginning of each call: what follows from separations that were set since the last one.
+  // At the beginning of each call: applies separations that were set since the last one.
   void settle();
-  // Of this moment, for tests.
+  // The current separations, for tests.
   Separations separations_now() const;
 
  private:
   std::uint64_t settled_;  // version of the separations
 };
 
-// Of the world that is computed now, by the threads of this pool.
+// For the world that is computed now, by the threads of this pool.
 struct Resources {
   Resources(Common& all, ThreadPool& threads);
   Resources(const Resources&) = delete;

@@ -11,15 +11,16 @@ namespace hpccd {
 
 class Tuner {
  public:
-  // At least one must be usable. The same may be usable in one step and not in the next.
+  // At least one must be usable. Which ones are may change from step to step.
   Backend next(const std::vector<Backend>& usable) const;
 
-  // A step that was meant for this backend: how long it took there, or that it was computed elsewhere.
+  // A step for this backend: its time, or that it was computed elsewhere.
   void took(Backend backend, double ms);
   void failed(Backend backend) { ++trial(backend).steps; }
 
  private:
-  // The first step of each warms up (a GPU's context alone takes 350 ms), and of the next two one may be disturbed.
+  // The first step of each backend warms up (a GPU's context alone takes 350 ms), and one of the next two may be
+  // disturbed.
   static constexpr int steps_each = 3;
   struct Trial {
     int steps = 0;

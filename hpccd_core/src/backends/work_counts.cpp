@@ -51,7 +51,7 @@ void WorkCounts::write(std::map<std::string, std::uint64_t>& stats) const {
     stats[kind + "_proven_contacts"] += c.contacts;
     stats[kind + "_undecided"] += c.undecided;
     stats[kind + "_by_integers"] += fallbacks[k].integers;
-    if (k == 2) continue;  // an edge and a face have neither k-DOPs nor another fallback
+    if (k == 2) continue;  // edge-face pairs have neither k-DOPs nor a second fallback
     stats[kind + "_rejected_kdop"] += c.kdop;
     stats[kind + "_by_tolerance"] += fallbacks[k].tolerance;
     stats[kind + "_by_extended"] += fallbacks[k].extended;

@@ -16,7 +16,7 @@ struct WorkCounts {
   BatchCounts batches[3];  // by kind
   FallbackCounts fallbacks[3];
   double leaf_pairs_seconds = 0, kdop_seconds = 0;
-  // What the query looked at, by kind; whether for the earliest contacts; and whether it took the time of its parts.
+  // What the query tested, by kind; whether it searched the earliest contacts; and whether it was timed by stage.
   bool asked[3] = {}, earliest = false, timed = false;
 
   void add(const std::vector<Worker>& workers);

@@ -12,10 +12,10 @@
 namespace hpccd {
 namespace {
 
-// The first bad world is the one that is named, however the worlds are spread over threads.
+// Errors name the first invalid world, however worlds are distributed to threads.
 class FirstBadWorld {
  public:
-  // True: what the world answers does not matter any more.
+  // True: the result of the world no longer matters.
   bool before(std::size_t world) const { return first_.load(std::memory_order_relaxed) < world; }
   void note(std::size_t world, std::string why) {
     const std::lock_guard lock(lock_);
@@ -39,7 +39,7 @@ Positions WorldByWorld::of_world(Positions all, std::size_t world) const {
   return hpccd::of_world(all, shared_.features.n_vertices, world);
 }
 
-// True: each world has its answer.
+// True: each world has a result.
 template <class Answer, class Query>
 bool WorldByWorld::answer(std::vector<Answer>& answers, Query&& query) {
   answers.clear();

@@ -14,8 +14,8 @@ namespace hpccd {
 
 class WorldByWorld : public DetectionBackend {
  public:
-  // Nothing where one of the worlds has no answer. Throws InvalidArgument for the first world with bad coordinates, and
-  // names it.
+  // Nothing if one of the worlds has no result. Throws InvalidArgument for the first world with invalid coordinates,
+  // and names it.
   std::optional<Detection> detect(Positions t0, Positions t1) final;
   std::optional<std::vector<double>> earliest(Positions t0, Positions t1) final;
   std::optional<Contacts> proximity(Positions vertices, double distance) final;
@@ -25,9 +25,9 @@ class WorldByWorld : public DetectionBackend {
  protected:
   explicit WorldByWorld(Resources& shared) : shared_(shared) {}
 
-  // Asks a backend of one world for this one; false: it has no answer.
+  // Runs a query of this world on a backend for one world; false: no result.
   using Ask = std::function<bool(DetectionBackend& backend, std::size_t world)>;
-  // Of each world once, from any threads. False where one has no answer: then the others need not be asked for.
+  // Calls it once per world, from any threads. False if a world has no result: then the other worlds may be skipped.
   virtual bool each_world(const Ask& ask) = 0;
 
   std::size_t n_worlds() const { return shared_.options.worlds; }
@@ -38,7 +38,8 @@ class WorldByWorld : public DetectionBackend {
   bool answer(std::vector<Answer>& answers, Query&& query);
   Positions of_world(Positions all, std::size_t world) const;
 
-  // Kept by a call that is cancelled: to give the memory of 10 million back to the system takes longer than to end it.
+  // Kept after a cancelled call: returning the memory of 10 million contacts to the system takes longer than ending the
+  // call.
   std::vector<Contacts> contacts_of_worlds_;
   Contacts contacts_;
 };

@@ -10,7 +10,7 @@ namespace hpccd {
 struct WorldMemory {
   OwnTree tree;
   NearList near;
-  double seconds = 0;  // that its last call took
+  double seconds = 0;  // time of its last call
 
   std::size_t bytes() const { return sizeof *this + near.bytes() + (tree.kept ? tree.kept->tree.bytes() : 0); }
 };

@@ -11,8 +11,8 @@
 namespace hpccd {
 namespace {
 
-// How many worlds get a thread each. What is left over where that would leave most threads idle gets all of them, world
-// by world; beside four worlds a thread it would save little.
+// The number of worlds that get one thread each. If the remaining worlds would leave most threads idle, each of them
+// gets all threads, one world after the other; with four or more worlds per thread this would save little.
 std::size_t n_side_by_side(std::size_t worlds, std::size_t threads) {
   const std::size_t rest = worlds % threads;
   return worlds >= 4 * threads || 2 * rest > threads ? worlds : worlds - rest;
@@ -57,10 +57,10 @@ bool WorldsOnCpus::each_world(const Ask& ask) {
     const WorldVisit visit(on_all_threads_, memories_, k);
     ask(on_all_threads_, k);
   }
-  return true;  // the CPU answers all
+  return true;  // the CPU supports all queries
 }
 
-// Those that took longest last time come first, so that what comes last, when threads run out of worlds, is short.
+// Worlds that took longest last time come first, so that the work is short when threads run out of worlds.
 void WorldsOnCpus::order(std::size_t side_by_side) {
   order_.resize(side_by_side);
   std::iota(order_.begin(), order_.end(), std::size_t{0});

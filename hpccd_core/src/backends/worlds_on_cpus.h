@@ -18,7 +18,7 @@ struct WorldMemories {
   std::size_t bytes() const;
 };
 
-// While a CPU backend is at one world.
+// During the computation of one world by a CPU backend.
 class WorldVisit {
  public:
   WorldVisit(CpuBackend& backend, WorldMemories& memories, std::size_t world)
@@ -42,7 +42,7 @@ class WorldsOnCpus final : public WorldByWorld {
   void count(std::map<std::string, std::uint64_t>& stats) const override;
 
  private:
-  // A world at a time, by one thread.
+  // The resources of one thread, which computes a world at a time.
   struct Engine {
     Engine(Common& common, ThreadPool& one_thread) : resources(common, one_thread), backend(resources) {}
     Resources resources;
@@ -57,9 +57,9 @@ class WorldsOnCpus final : public WorldByWorld {
 
   CpuBackend& on_all_threads_;
   WorldMemories& memories_;
-  ThreadPool one_thread_{1};                      // of each engine: it runs a job where it is called
-  std::vector<std::unique_ptr<Engine>> engines_;  // by thread, from its first world on
-  std::vector<std::size_t> order_;                // of those that get a thread each
+  ThreadPool one_thread_{1};                      // of each engine: it runs jobs on the calling thread
+  std::vector<std::unique_ptr<Engine>> engines_;  // by thread, created by its first world
+  std::vector<std::size_t> order_;                // the worlds that get a thread each
 };
 
 }  // namespace hpccd

@@ -5,8 +5,8 @@
 
 namespace hpccd {
 
-// One turn of active waiting: 15 to 50 ns on x86-64, leaving the core's resources to a sibling thread. On aarch64 isb:
-// what stands for it there, yield, does nothing on most cores, and a turn would be over at once.
+// One iteration of spinning: 15 to 50 ns on x86-64, leaving the core's resources to a sibling thread. On aarch64 isb:
+// the equivalent instruction, yield, does nothing on most cores and would return at once.
 inline void pause() {
 #if defined(__x86_64__)
   __builtin_ia32_pause();
@@ -17,11 +17,11 @@ inline void pause() {
 #endif
 }
 
-// Active waiting for what should take a moment. Where it takes longer (the other thread was interrupted, or is long in
-// exact arithmetic), the core is left to others.
+// Spins for an event that should occur soon. If it takes longer (the other thread was interrupted, or is in a long
+// exact computation), the core is released to other threads.
 class ActiveWait {
  public:
-  // What was waited for came: the next wait is a new one.
+  // The event has occurred: the next wait starts from zero.
   void reset() { turns_ = 0; }
   void turn() {
     if (turns_ < patience) {
@@ -33,7 +33,7 @@ class ActiveWait {
   }
 
  private:
-  static constexpr int patience = 4000;  // 60 to 200 us, as a pool waits for its next job (parallel.cpp)
+  static constexpr int patience = 4000;  // 60 to 200 us, as long as a pool waits for its next job (parallel.cpp)
   int turns_ = 0;
 };
 

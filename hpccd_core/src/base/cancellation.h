@@ -12,11 +12,11 @@
 
 namespace hpccd {
 
-// On a cache line of its own: what others write beside it would have to be fetched with it.
+// On a cache line of its own, so that writes of neighbouring data do not invalidate it.
 class alignas(64) Cancellation {
  public:
   void request() { requested_.store(true, std::memory_order_relaxed); }
-  // Throws Cancelled where it was requested.
+  // Throws Cancelled if requested.
   void heed() const {
     if (requested_.load(std::memory_order_relaxed)) throw Cancelled();
   }
@@ -36,7 +36,7 @@ void in_pieces(const Cancellation& cancellation, std::size_t n, std::size_t grai
   }
 }
 
-// What v.resize(n) does: new memory comes page by page from the system, 100 MB in 25 to 100 ms.
+// Equivalent to v.resize(n), with cancellation: new memory is mapped page by page, 100 MB in 25 to 100 ms.
 template <class T>
 void resize(std::vector<T>& v, std::size_t n, const Cancellation& cancellation) {
   constexpr std::size_t piece = (std::size_t{1} << 20) / sizeof(T);
@@ -48,7 +48,7 @@ void resize(std::vector<T>& v, std::size_t n, const Cancellation& cancellation) 
   v.resize(n);
 }
 
-// Room for as many again: what v.push_back does by itself where it is full, but 10 million contacts take 0.1 s.
+// Doubles the capacity like v.push_back, with cancellation: 10 million contacts take 0.1 s.
 template <class T>
 void grow(std::vector<T>& v, const Cancellation& cancellation) {
   std::vector<T> larger;
@@ -58,7 +58,7 @@ void grow(std::vector<T>& v, const Cancellation& cancellation) {
   v.swap(larger);
 }
 
-// The same order for sorting many: a million take 80 ms.
+// An order for sorting large arrays, with cancellation: a million elements take 80 ms.
 template <class Less>
 auto heeding(const Cancellation& cancellation, Less less) {
   return [&cancellation, less](const auto& a, const auto& b) {

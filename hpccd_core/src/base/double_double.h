@@ -47,7 +47,7 @@ HPCCD_HD DoubleDouble operator*(DoubleDouble a, DoubleDouble b) {
 }
 HPCCD_HD DoubleDouble operator/(DoubleDouble a, DoubleDouble b) {
   const double t = a.high / b.high;
-  // The remainder a - t b, of which the high parts cancel exactly.
+  // The remainder a - t b, in which the high parts cancel exactly.
   const DoubleDouble r = detail::two_product(b.high, t);
   const double rest = ((a.high - r.high) - r.low) + fma(-t, b.low, a.low);
   return detail::fast_two_sum(t, rest / b.high);
@@ -64,7 +64,7 @@ HPCCD_HD bool operator>=(DoubleDouble a, DoubleDouble b) { return b <= a; }
 
 HPCCD_HD DoubleDouble select(bool m, DoubleDouble a, DoubleDouble b) { return m ? a : b; }
 
-// Where a root of a polynomial lies is proven afterwards by signs: this one is only a guess at twice the precision.
+// The position of a polynomial's root is proven afterwards by signs: this is only a guess with twice the precision.
 HPCCD_HD DoubleDouble square_root(DoubleDouble a) {
   if (!(a.high > 0)) return DoubleDouble(0);
   const double r = sqrt(a.high);

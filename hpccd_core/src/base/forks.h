@@ -3,7 +3,7 @@
 
 namespace hpccd {
 
-// How often this process was a child made by fork(), which has no thread of its parent but the one that made it.
+// The number of times that this process is a descendant by fork(). A child has only the thread that called fork().
 int forks();
 
 }  // namespace hpccd

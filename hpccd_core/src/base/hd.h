@@ -8,8 +8,8 @@
 #define HPCCD_HD inline __attribute__((always_inline))
 #endif
 
-// The same for larger code, of which GPUs keep one copy only where it says CALL: the assembler takes minutes and
-// gigabytes for integers of hundreds of bits that are copied into their callers, loops unrolled.
+// The same for larger code, of which GPUs get one copy, only where marked CALL: the assembler takes minutes and
+// gigabytes for integers of hundreds of bits that are inlined into their callers, with loops unrolled.
 #if defined(__CUDACC__)
 #define HPCCD_HOST_DEVICE __host__ __device__
 #define HPCCD_HOST_DEVICE_CALL __host__ __device__ __noinline__

@@ -10,7 +10,8 @@
 
 namespace hpccd {
 
-// Throws InvalidArgument where it is NaN, infinite or negative: comparisons with such a length would decide something.
+// Throws InvalidArgument if it is NaN, infinite or negative: comparisons with such a length would still decide
+// something.
 inline void check_length(const char* name, double length) {
   if (std::isfinite(length) && length >= 0) return;
   char text[32];

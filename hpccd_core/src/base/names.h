@@ -8,7 +8,7 @@
 
 namespace hpccd {
 
-// Throws InvalidArgument where `value` is none of the names, of which `last` is the last.
+// Throws InvalidArgument if `value` is not one of the names; `last` is the last one.
 template <class Enum>
 void check_name(const char* name, Enum value, Enum last) {
   if (value > last)

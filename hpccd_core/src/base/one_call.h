@@ -25,9 +25,9 @@ class OneCall {
     holder_.store(none, std::memory_order_release);
     holder_.notify_one();
   }
-  // Whether lock() would wait now, or throw.
+  // Whether lock() would wait or throw now.
   bool held() const { return holder_.load(std::memory_order_relaxed) != none; }
-  // What it protects was left in the middle of a change.
+  // Whether the protected data was left in an inconsistent state.
   bool abandoned() const {
     const int holder = holder_.load(std::memory_order_relaxed);
     return holder != none && holder != forks() + 1;

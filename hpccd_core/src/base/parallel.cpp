@@ -17,7 +17,8 @@
 namespace hpccd {
 namespace {
 
-// Whether it became ready. By the clock: a pause takes 16 ns on some processors and 40 on others.
+// Spins until it is ready; false after a timeout. Measured by the clock: a pause takes 16 ns on some processors and 40
+// on others.
 template <class Ready>
 bool wait_actively(std::chrono::microseconds limit, Ready&& ready) {
   if (limit.count() == 0) return ready();
@@ -31,8 +32,8 @@ bool wait_actively(std::chrono::microseconds limit, Ready&& ready) {
   return false;
 }
 
-// A sleeper announces itself before it looks whether it may go on; a waker brings about what is waited for before it
-// looks whether somebody sleeps (all in one order, std::memory_order_seq_cst). So one of them sees the other.
+// A sleeper announces itself before it checks the condition; a waker changes the condition before it checks for
+// sleepers (in one total order, std::memory_order_seq_cst). So one of them sees the other.
 template <class Ready>
 void sleep(const std::atomic<int>& changes, Ready&& ready) {
   for (;;) {
@@ -62,8 +63,8 @@ std::uint64_t ThreadPool::Entry::word() const {
 
 ThreadPool::ThreadPool(int threads)
     : count_(threads > 0 ? threads : hardware_threads()), forks_(forks()), affinity_(count_), begun_(count_ - 1) {
-  // Longer than the serial parts between two jobs of a call, and than a program takes from one call to the next if it
-  // does nothing else. More threads than cores would only keep each other from working.
+  // Longer than the serial parts between two jobs of a call, and than the time between two calls of a program that does
+  // nothing else. More threads than cores would only delay each other.
   if (count_ <= hardware_threads()) awake_for_ = std::chrono::microseconds(200);
   try {
     for (int i = 1; i < count_; ++i) workers_.emplace_back([this, i] { work(i); });
@@ -84,7 +85,8 @@ ThreadPool::~ThreadPool() { end(); }
 
 void ThreadPool::end() {
   if (forks_ != forks()) {
-    // Threads that are not there can neither be joined nor detached, their memory may be gone: only their handles end.
+    // Threads that do not exist can neither be joined nor detached, and their memory may be gone: only their handles
+    // are reset.
     for (auto& w : workers_) std::construct_at(&w);
     return;
   }
@@ -132,10 +134,10 @@ bool ThreadPool::join(std::uint32_t& seen) {
 }
 
 void ThreadPool::work(int thread) {
-  // What the run-time library keeps of a thread's exceptions is allocated when it is first asked for. Not at the first
+  // The run-time library allocates a thread's exception state when it is first needed. This must not be the first
   // throw, which may be that of a failed allocation: it would end the process.
   (void)std::current_exception();
-  const StandardArithmetic arithmetic;  // a new thread inherits the mode of the thread that starts it
+  const StandardArithmetic arithmetic;  // a new thread inherits the mode of its creator
   begun_.count_down();
   std::uint32_t seen = 0;
   while (!stop_) {

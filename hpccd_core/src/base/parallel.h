@@ -22,7 +22,7 @@ namespace hpccd {
 
 class ThreadPool {
  public:
-  // The caller's thread is one of them; 0: all cores. Throws std::runtime_error where the system starts fewer.
+  // The caller's thread is one of them; 0: all cores. Throws std::runtime_error if the system cannot start them.
   explicit ThreadPool(int threads);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
@@ -34,23 +34,23 @@ class ThreadPool {
   };
 
   int size() const { return count_; }
-  // Throws std::runtime_error in a child made by fork(), which has none of them but the caller's.
+  // Throws std::runtime_error in a child made by fork(), which has only the caller's thread.
   void require_threads() const;
 
-  // From here on parallel_for ends with Cancelled where that is requested.
+  // From now on parallel_for ends with Cancelled if requested.
   void heed(const Cancellation& cancellation) { cancellation_ = &cancellation; }
   const Cancellation& cancellation() const { return *cancellation_; }
 
   // Runs job(thread number) once on every thread and returns when all have finished. An exception of a job is rethrown
   // here.
   void run(const std::function<void(int)>& job) { run(job, Join::all); }
-  // The same on the calling thread and on those that come before it has finished: for jobs whose work lies in a common
-  // heap, so that nobody waits for a thread that wakes up when there is nothing left to do.
+  // The same on the calling thread and on those that arrive before it has finished: for jobs with a common queue of
+  // work, so that the caller does not wait for a thread that wakes up when nothing is left to do.
   void share(const std::function<void(int)>& job) { run(job, Join::in_time); }
 
  private:
   enum class Join { all, in_time };
-  // What a job's state says, in one word: its number, whether it still takes threads, how many joined and finished.
+  // The state of a job in one word: its number, whether it still accepts threads, how many have joined and finished.
   struct Entry {
     std::uint32_t job;
     bool closed;
@@ -69,14 +69,14 @@ class ThreadPool {
   void wait_for_threads(Join join);
   bool finished(Join join) const;
 
-  int count_, forks_;  // of its threads; of this process when it was made
+  int count_, forks_;  // number of threads; forks() when it was created
   std::vector<std::thread> workers_;
   const Cancellation* cancellation_ = &never_cancelled;
   const std::function<void(int)>* job_ = nullptr;
   std::atomic<std::uint64_t> entry_{0};
   std::atomic<bool> stop_{false};
   std::chrono::microseconds awake_for_{0};
-  std::atomic<int> starts_{0}, ends_{0};  // change when there is something to wake up for
+  std::atomic<int> starts_{0}, ends_{0};  // change when there is a reason to wake up
   std::atomic<int> sleeping_{0};
   ThreadAffinity affinity_;
   std::latch begun_;  // each of the workers
@@ -86,7 +86,8 @@ class ThreadPool {
 };
 
 // f(begin, end, thread) over [0, n) in pieces of at most `grain`. Each thread begins with its own part of the range and
-// then helps the others: what the same range brought into a core's cache in an earlier loop is mostly still there.
+// then helps the others: data that an earlier loop over the same range has brought into a core's cache is mostly still
+// there.
 template <class F>
 void parallel_for(ThreadPool& pool, std::size_t n, std::size_t grain, F&& f) {
   if (n == 0) return;

@@ -16,13 +16,13 @@ class Profiler {
     stages_.clear();
     start_ = last_ = Clock::now();
   }
-  // Everything since the last mark belongs to `stage`.
+  // Assigns the time since the last mark to `stage`.
   void mark(const char* stage) {
     const auto now = Clock::now();
     stages_[stage] += milliseconds(now - last_);
     last_ = now;
   }
-  // The same, of which `ms` belong to `part`.
+  // The same, with `ms` of it assigned to `part`.
   void mark_split(const char* stage, const char* part, double ms) {
     mark(stage);
     stages_[stage] -= ms;

@@ -15,7 +15,7 @@ HPCCD_HD unsigned bits(bool m) { return m ? 1u : 0u; }
 HPCCD_HD double square_root(double x) { return sqrt(x); }
 HPCCD_HD float square_root(float x) { return sqrtf(x); }
 
-// What a lane type has beside its arithmetic: how many lanes, the scalar, and a constant in every lane.
+// Properties of a lane type: the number of lanes, the scalar, and a constant in every lane.
 template <class R>
 struct RealTraits;
 template <>
@@ -31,7 +31,7 @@ struct RealTraits<float> {
   static constexpr int width = 1;
 };
 
-// Written through select so that every backend gives the same bits, for -0 and NaN too.
+// Written with select so that every backend is bit-identical, also for -0 and NaN.
 template <class R>
 HPCCD_HD R lesser(R a, R b) {
   return select(a < b, a, b);
@@ -44,7 +44,7 @@ template <class R>
 HPCCD_HD R magnitude(R a) {
   return select(a < R(0), R(0) - a, a);
 }
-// As the lanes have it, which drop the sign of zero too: one float gives the same bits as one in a lane.
+// Drops the sign of zero like the lanes, so that one float is bit-identical to a float in a lane.
 HPCCD_HD float magnitude(float a) { return fabsf(a); }
 
 }  // namespace hpccd

@@ -6,7 +6,7 @@
 
 namespace hpccd {
 
-// The best usable set where `wanted` is automatic; throws InvalidArgument where this machine lacks what is wanted.
+// The fastest supported set if `wanted` is automatic; throws InvalidArgument if this machine lacks the wanted one.
 Simd resolve(Simd wanted);
 
 const char* name_of(Simd simd);

@@ -7,9 +7,9 @@
 
 namespace hpccd {
 
-// For a few instructions at a time. std::mutex puts whoever finds it taken to sleep, and Linux wakes him on the core of
-// the one who gives it back, where he waits for that one's time slice to end: 2.3 ms of a step of 1.4 were seen, with
-// the core idle that he had come from.
+// For a few instructions at a time. std::mutex puts a waiting thread to sleep, and Linux wakes it on the core of the
+// thread that releases the lock, where it waits for the end of that thread's time slice: delays of 2.3 ms in a step of
+// 1.4 ms were seen, while the waiting thread's own core was idle.
 class SpinLock {
  public:
   void lock() {

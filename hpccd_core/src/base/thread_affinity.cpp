@@ -14,7 +14,7 @@ namespace hpccd {
 
 void ThreadAffinity::awake(int thread) {
   std::atomic<int>& core = places_[static_cast<std::size_t>(thread)].core;
-  // Thread 0 reads it before each job: a store that changes nothing would take the line away from it.
+  // Thread 0 reads it before each job: a redundant store would take the cache line away from it.
   if (const int now = sched_getcpu(); core.load(std::memory_order_relaxed) != now)
     core.store(now, std::memory_order_relaxed);
 }

@@ -17,21 +17,22 @@
 
 namespace hpccd {
 
-// Thread 0 gives out the jobs. Elsewhere than on Linux, and where the system refuses, nothing is done.
+// Thread 0 distributes the jobs. On other systems than Linux, and if the system refuses, nothing is done.
 class ThreadAffinity {
  public:
   explicit ThreadAffinity(int threads) : places_(static_cast<std::size_t>(threads)) {}
 
-  // By a thread: it runs; it goes to sleep; it was woken.
+  // Called by a thread: it runs; it goes to sleep; it was woken.
   void awake(int thread);
   void asleep(int thread);
   void woken(int thread);
 
-  // By thread 0, before a job: binds those of `others` (1, 2, ...) that sleep, or that were last seen on the core of
-  // another, to an allowed core that none is known to use. False: nothing was done, as where the allowed cores are not
-  // as many as the threads: with fewer it cannot, and with more the kernel knows better which of them are siblings.
+  // Called by thread 0 before a job: binds those of `others` (1, 2, ...) that sleep, or that were last seen on another
+  // thread's core, to an allowed core that no thread is known to use. False: nothing was done, for example because the
+  // number of allowed cores differs from the number of threads: with fewer it is impossible, and with more the kernel
+  // knows better which of them are siblings.
   bool place(std::vector<std::thread>& others);
-  // By thread 0, when it has done its part: another process may keep the core busy that a thread was bound to.
+  // Called by thread 0 when it has finished its part: another process may occupy the core to which a thread was bound.
   void free_late(std::vector<std::thread>& others);
 
  private:

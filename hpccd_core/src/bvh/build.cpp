@@ -13,7 +13,7 @@ struct Range {
   std::uint32_t node, begin, end;
 };
 
-// A mesh's primitives: their numbers, and where they stand among those that are split.
+// A mesh's primitives: their numbers, and their range among those that are split.
 struct Part {
   struct Numbers {
     std::uint32_t first, n;
@@ -53,7 +53,7 @@ class Builder {
 
  private:
   void find_parts() {
-    // Features in the order of their vertices, and those of a mesh: numbered from first_primitive on.
+    // Features sorted by their vertices, and those of a mesh: numbered from first_primitive on.
     const auto numbers = [](const auto& lone, const auto& from, const auto& to, std::uint32_t first_primitive) {
       const auto begin = std::ranges::lower_bound(lone, from), end = std::ranges::lower_bound(lone, to);
       return Part::Numbers{first_primitive + static_cast<std::uint32_t>(begin - lone.begin()),
@@ -102,7 +102,7 @@ class Builder {
       queue.push_back({child, r.begin, r.begin + half});
       queue.push_back({child + 1, r.begin + half, r.end});
     }
-    // In the order of the upper tree: neighbours in space are neighbours in memory.
+    // In the order of the upper tree, so that neighbours in space are neighbours in memory.
     std::uint32_t begin = 0;
     for (const Centroid& mesh : meshes) {
       Part& part = parts_[mesh.number];
@@ -133,14 +133,14 @@ class Builder {
     return child;
   }
 
-  // Left halves take whole leaves, so that leaves are full but for the last of each mesh.
+  // Left halves get whole leaves, so that all leaves are full except the last of each mesh.
   static std::uint32_t left_size(std::uint32_t n) {
     const std::uint32_t leaves = (n + Tree::leaf_size - 1) / Tree::leaf_size;
     return (leaves + 1) / 2 * Tree::leaf_size;
   }
 
   void split_level() {
-    // A range larger than a thread's share of all would leave the others without work.
+    // A larger range than one thread's share would leave the other threads idle.
     constexpr std::uint32_t worth_sharing = 1 << 14;
     const std::uint32_t share = features_.n_primitives() / static_cast<std::uint32_t>(pool_.size());
     const auto is_shared = [&](const Range& r) {
@@ -173,7 +173,7 @@ class Builder {
   }
 
   void lay_out_slots() {
-    // Leaves in the order of their primitives: neighbours in space are neighbours in memory.
+    // Leaves in the order of their primitives, so that neighbours in space are neighbours in memory.
     std::sort(leaf_ranges_.begin(), leaf_ranges_.end(),
               heeding(cancellation_, [](const Range& a, const Range& b) { return a.begin < b.begin; }));
     const std::size_t n_leaves = leaf_ranges_.size();
@@ -188,7 +188,7 @@ class Builder {
     in_pieces(cancellation_, n_leaves, some, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) tree_.leaves[i] = at = leaf_behind(at, tree_.leaves[i]);
     });
-    // Room behind the last slot, so that a full vector can be loaded anywhere.
+    // Padding after the last slot, so that a full vector can be loaded anywhere.
     make_room(tree_.face_of_slot, at.end_face + Tree::load_width);
     make_room(tree_.edge_of_slot, at.end_edge + Tree::load_width);
     make_room(tree_.vertex_of_slot, at.end_vertex + Tree::load_width);
@@ -210,10 +210,10 @@ class Builder {
     gather_blocks(n_leaves);
   }
 
-  // In the order of their leaves.
+  // Blocks in the order of their leaves.
   void gather_blocks(std::size_t n_leaves) {
     resize(tree_.block_of_leaf, n_leaves, cancellation_);
-    // A node with more than sixteen leaves has two children of eight at least.
+    // A node with more than sixteen leaves has two children with at least eight.
     tree_.blocks.reserve(n_leaves / (Block::width / 2) + scene_.meshes().size());
     std::vector<std::uint32_t> stack;
     if (!tree_.nodes.empty()) stack.push_back(0);
@@ -235,7 +235,7 @@ class Builder {
   }
 
   void choose_front() {
-    // Enough for any number of threads, and each worth a thread's while.
+    // Enough subtrees for any number of threads, each large enough to be worth a thread's time.
     const std::uint32_t most = std::max(features_.n_primitives() / 256, 8 * Tree::leaf_size);
     struct Visit {
       std::uint32_t node, above;
@@ -257,7 +257,7 @@ class Builder {
     }
   }
 
-  // The distinct vertices of a leaf, those that it represents first.
+  // The distinct vertices of a leaf, starting with those that it represents.
   class Corners {
    public:
     std::uint8_t add(std::uint32_t vertex) {
@@ -290,7 +290,7 @@ class Builder {
     return corners;
   }
 
-  // Its numbers of slots, as if it were the first.
+  // The slots of a leaf, as if it were the first.
   LeafRange size_of_leaf(const Range& r) const {
     LeafRange leaf{};
     for (std::uint32_t i = r.begin; i < r.end; ++i) {
@@ -359,10 +359,10 @@ class Builder {
   const std::vector<MotionBox>& vertex_boxes_;
   ThreadPool& pool_;
   const Cancellation& cancellation_ = pool_.cancellation();
-  static constexpr std::size_t some = 1 << 15;  // pieces of the serial work: less than 1 ms
+  static constexpr std::size_t some = 1 << 15;  // piece size of the serial work: less than 1 ms
   std::vector<Part> parts_;                     // by mesh
   std::unique_ptr<Centroid[]> primitives_;      // in the order of the tree, as far as it has been split
-  std::unique_ptr<Centroid[]> scratch_;         // as large, for the splits
+  std::unique_ptr<Centroid[]> scratch_;         // scratch memory of the splits
   std::vector<Range> level_, leaf_ranges_;
 };
 

@@ -13,7 +13,7 @@ namespace hpccd {
 
 // Beyond this, differences and squares of coordinates could overflow in the error bounds.
 inline constexpr double largest_coordinate = 1e150;
-// Of one snapshot only differences are taken before a range is looked at.
+// For one snapshot only differences are computed before ranges are checked.
 inline constexpr double largest_in_snapshot = 1e300;
 
 struct CoordinateMap {
@@ -30,8 +30,8 @@ struct CoordinateMap {
     }
     const int exponent = extent > 0 ? ilogb(extent) : 0;
     if (extent > 0) m.scale = ldexp(1.0, exponent < -1000 ? 1000 : exponent > 1000 ? -1000 : -exponent);
-    // On a coarse grid, so that a motion inside a large scene leaves the map as it is, and with it the boxes of what
-    // rests. The map depends on the step alone, never on the steps before.
+    // On a coarse grid, so that a motion inside a large scene does not change the map, nor the boxes of resting meshes.
+    // The map depends on the step only, never on previous steps.
     for (int k = 0; k < 3; ++k) {
       const double steps = 4 * (m.center[k] * m.scale);
       if (extent > 0 && fabs(steps) < 1e15) m.center[k] = rint(steps) / 4 / m.scale;

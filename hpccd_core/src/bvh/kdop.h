@@ -10,22 +10,22 @@ namespace hpccd {
 
 inline constexpr int n_kdop_directions = 8;
 
-// Where a vertex is along each direction at the ends of its motion.
+// Coordinates of a vertex along each direction at both ends of its motion.
 struct alignas(64) VertexKdop {
   float t0[n_kdop_directions], t1[n_kdop_directions];
 };
 
-// The k-DOP of some vertices, at t = 0 and then at t = 1.
+// The k-DOP of several vertices, at t = 0 and then at t = 1.
 struct alignas(64) Kdop {
   float low[2 * n_kdop_directions], high[2 * n_kdop_directions];
 };
 
-// By how much k-DOPs of features may lie apart in each direction that come within a separation of each other.
+// The largest gap in each direction between k-DOPs of features that come within a separation of each other.
 struct alignas(64) KdopMargin {
   float in[2 * n_kdop_directions] = {};
 
   KdopMargin() = default;
-  // In the map's scale. Rounding: values lie below eight, so two of them and their difference are off by 7.2e-7.
+  // In the map's scale. Values are below eight, so two of them and their difference have rounding errors of 7.2e-7.
   KdopMargin(double separation, double scale) {
     constexpr double length[n_kdop_directions] = {1.4143, 1.4143, 1.4143, 1.4143, 1.4143, 1.4143, 2.2361, 2.2361};
     for (int k = 0; k < 2 * n_kdop_directions; ++k)
@@ -33,9 +33,10 @@ struct alignas(64) KdopMargin {
   }
 };
 
-// x along direction k; after those of the k-DOP come the axes. One sum of two terms, one of them perhaps doubled:
-// rounded once, which never reverses an order, so no margin is needed. (Sums of three terms would need one. Of all that
-// a cache line has room for besides the six diagonals, the last two left the fewest pairs on the published scenes.)
+// The coordinate of x along direction k; the axes follow the directions of the k-DOP. It is one sum of two terms, one
+// of them possibly doubled, and is rounded once. This never reverses an order, so no margin is needed. (Sums of three
+// terms would need one. Of all directions that fit into a cache line besides the six diagonals, the last two left the
+// fewest pairs on the published scenes.)
 HPCCD_HD double along(int k, const Vec3<double>& x) {
   switch (k) {
     case 0:
@@ -63,7 +64,7 @@ HPCCD_HD double along(int k, const Vec3<double>& x) {
   }
 }
 
-// Where a vertex of one snapshot is along the first directions of the k-DOPs that no axis is near to.
+// Coordinates of a vertex of one snapshot along those first directions of the k-DOPs that are far from all axes.
 struct SlantedCoordinates {
   float along[3];
   HPCCD_HD SlantedCoordinates(const Vec3<double>& x, const CoordinateMap& map) {
@@ -73,7 +74,7 @@ struct SlantedCoordinates {
   }
 };
 
-// Neither does the map to float reverse an order (coordinate_map.h).
+// The map to float does not reverse an order either (coordinate_map.h).
 HPCCD_HD VertexKdop vertex_kdop(const Vec3<double>& t0, const Vec3<double>& t1, const CoordinateMap& map) {
   const Vec3<double> center{map.center[0], map.center[1], map.center[2]};
   VertexKdop kdop;

@@ -16,10 +16,10 @@
 namespace hpccd {
 namespace {
 
-// Of ten pieces of 1024 vertices one of four threads gets three, a fifth more than its share.
+// With ten pieces of 1024 vertices, one of four threads would get three, a fifth more than its share.
 constexpr std::size_t grain = 256;
 
-// NaN fails the comparison as well.
+// False for NaN.
 bool acceptable(double x, double largest) { return std::fabs(x) <= largest; }
 
 template <class Real>
@@ -35,7 +35,7 @@ Extent extent_of(const Real* x, std::size_t begin, std::size_t end, double large
   return e;
 }
 
-// As many digits as tell it apart: 1e+200, not two hundred zeros.
+// The shortest decimal that identifies it: 1e+200, not two hundred zeros.
 std::string shortest(double x) {
   char text[32];
   return {text, std::to_chars(text, text + sizeof text, x).ptr};
@@ -85,8 +85,8 @@ void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, const
   }
 }
 
-// Of one snapshot. In place of a second end, bounds along three directions more: slanted features leave far less room.
-// slanted(x): the coordinates along these directions.
+// For one snapshot: bounds along three more directions take the place of the second end. They leave far fewer pairs of
+// slanted features. slanted(x): the coordinates along these directions.
 template <class Real, class BoxMap, class Slanted>
 void copy_snapshot(const Real* x, const BoxMap& map, const Slanted& slanted, std::size_t begin, std::size_t end,
                    VertexMotion* vertices, MotionBox* boxes) {
@@ -107,9 +107,9 @@ void copy_snapshot(const Real* x, const BoxMap& map, const Slanted& slanted, std
 // 5,000 triangles, smallest distances took 16 ms instead of 2.5.
 constexpr double least_spread = 1e-5;
 
-// For each plane of two axes the direction along which edges extend least, so that slanted bars are separated as well
-// as upright ones. `extents`: by plane and direction. The common directions stay unless another is far better: for
-// sheets that are cut into triangles along one diagonal, another one would gain nothing.
+// For each plane of two axes, the direction along which edges extend least, so that slanted bars are separated as well
+// as upright ones. `extents`: by plane and direction. The default directions are kept unless another one is far better:
+// for sheets that are cut into triangles along one diagonal, another one would gain nothing.
 std::array<SlantedDirection, 3> best_directions(const double (&extents)[3][std::size(slanted_directions)]) {
   std::array<SlantedDirection, 3> best;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -120,9 +120,9 @@ std::array<SlantedDirection, 3> best_directions(const double (&extents)[3][std::
   return best;
 }
 
-// By how much the boxes of a mesh grow: half the separation, of which halving a denormal number may lose one half of
-// the least, and what rounding x - margin and x + margin can lose. More than the scene is large would not bring more
-// pairs, but boxes without an area.
+// The amount by which the boxes of a mesh grow: half the separation (halving a denormal number may lose half of the
+// smallest one) and the rounding errors of x - margin and x + margin. A margin beyond the size of the scene would not
+// add pairs, only boxes without an area.
 double margin_for(double separation, const Extent& scene) {
   if (!(separation > 0)) return 0;
   double most = 0, size = 0;
@@ -162,7 +162,7 @@ void Extent::include(const Extent& e) {
 template <class Real>
 void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::span<const double> separations,
                           ThreadPool& pool) {
-  if (snapshot_ != was_snapshot_) resting.clear();  // what one takes may be too large for the other
+  if (snapshot_ != was_snapshot_) resting.clear();  // a value allowed for one may be too large for the other
   const auto moves = [&](std::size_t part) { return resting.empty() || !resting[part]; };
   std::vector<Piece> pieces = pieces_of(parts_, moves);
   std::vector<Extent> extents(pieces.size());
@@ -251,7 +251,7 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
   });
 }
 
-// Measures how short edges are, and for a snapshot also how slanted.
+// Measures the lengths of edges, and for a snapshot also their slant.
 template <class Real>
 void MotionBounds::measure_edges(const Real* t0, const Real* t1) {
   short_edge = 0;

@@ -18,7 +18,7 @@
 
 namespace hpccd {
 
-// A part of the vertices that moves, or rests, as a whole: those of one mesh.
+// A part of the vertices that moves or rests as a whole: those of one mesh.
 struct VertexRange {
   std::size_t begin, end;
 };
@@ -35,39 +35,38 @@ struct MotionBounds {
   const Features* features = nullptr;
   std::vector<VertexMotion> vertices;
   std::vector<MotionBox> boxes;
-  bool grown = false;  // some of them hold more than their vertex: half a separation around it
+  bool grown = false;  // some contain more than their vertex: half a separation around it
   std::vector<VertexKdop> kdops;
-  std::vector<RoundedMotion> rounded;  // where there are k-DOPs
+  std::vector<RoundedMotion> rounded;  // empty without k-DOPs
   bool has_kdops() const { return !snapshot_; }
   CoordinateMap map;
-  // The length of a short edge (scene/edge_sample.h): its largest extent along an axis, at the end of the motion where
-  // it is shorter.
+  // The length of a short edge (scene/edge_sample.h): its largest extent along an axis, at the end of the motion at
+  // which it is shorter.
   double short_edge = 0;
-  // Whether features are so small beside the scene that floats hardly distinguish them. Then each axis, and each
-  // slanted direction of a snapshot, has a map of its own for boxes if that is finer. Otherwise boxes use the common
-  // map.
+  // Whether features are so small compared with the scene that floats hardly distinguish them. Then each axis, and each
+  // slanted direction of a snapshot, has its own map for boxes if that is finer. Otherwise boxes use the common map.
   bool spread = false;
   std::vector<SqueezedAxis> squeezed;
   // For boxes: the scale of their map, and `rounding` in their coordinates.
   double box_scale = 1, box_rounding = 0;
-  // What sums of two coordinates may lose, in those of the scene: 2.2e-16 of the largest for each of two
-  // vertices, 3.4e-16 where one is doubled. Far from the origin that is more than rounding to floats.
+  // Rounding errors of sums of two coordinates, in units of the scene: 2.2e-16 of the largest for each of two vertices,
+  // 3.4e-16 if one is doubled. Far from the origin this exceeds the rounding to floats.
   double rounding = 0;
-  // By mesh: its vertices and boxes are still those of the call before. Empty: of none.
+  // By mesh: whether its vertices and boxes are unchanged since the previous call. Empty: no mesh.
   std::vector<char> resting;
-  // Boxes of the whole sweep, where a method asks for them.
+  // Boxes of the whole sweep, for methods that need them.
   std::vector<Box> swept;
 
-  // Boxes of features that come within a separation of each other overlap too. `separations`: by mesh, the largest of
-  // its pairs; empty: none.
-  // Throws InvalidArgument where a coordinate is not finite or too large, or where a static mesh moves.
+  // Boxes of features that come within a separation of each other overlap as well. `separations`: by mesh, the largest
+  // of its pairs; empty: none. Throws InvalidArgument if a coordinate is not finite or too large, or if a static mesh
+  // moves.
   void update(const Scene& scene, Positions vertices_t0, Positions vertices_t1, std::span<const double> separations,
               ThreadPool& pool);
   // For one snapshot: a motion without displacement, whose boxes have bounds along other directions in place of the
   // second end (SlantedDirection); without k-DOPs. `distance`: features count as near up to this distance, if it is
   // known.
   void update(const Scene& scene, Positions vertices, ThreadPool& pool, double distance = 0);
-  // The same for vertices of no scene, without separations.
+  // The same for vertices without a scene, without separations.
   void update(Positions vertices_t0, Positions vertices_t1, ThreadPool& pool);
   void sweep(ThreadPool& pool);
   // Smallest and largest coordinates of its vertices.
@@ -89,12 +88,12 @@ struct MotionBounds {
 
   StaticMeshes statics_;
   std::vector<VertexRange> parts_;  // of each mesh
-  std::vector<Extent> extents_;     // of each part, when it was last taken
+  std::vector<Extent> extents_;     // range of each part when it was last computed
   std::vector<double> margins_;     // of each part's boxes
   std::array<SlantedDirection, 3> slanted_;
   double distance_ = 0, largest_ = largest_coordinate;
   bool snapshot_ = false, was_snapshot_ = false;
-  bool complete_ = false;  // false while a call is under way, and after it has thrown
+  bool complete_ = false;  // false during a call, and after it has thrown
 };
 
 }  // namespace hpccd

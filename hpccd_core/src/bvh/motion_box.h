@@ -38,8 +38,8 @@ struct MotionBox {
   }
 };
 
-// The order of the twelve bounds, here and wherever they lie apart: low and high at t = 0, low and high at t = 1, each
-// along x, y and z.
+// The order of the twelve bounds wherever they are stored separately: low and high at t = 0, low and high at t = 1,
+// each along x, y and z.
 inline constexpr std::uint32_t n_bounds = 12;
 enum class Side : std::uint32_t { low, high };
 HPCCD_HD constexpr std::uint32_t bound_number(std::uint32_t end, Side side, std::uint32_t axis) {

@@ -8,7 +8,8 @@
 
 namespace hpccd {
 
-// The box of a primitive from its vertices': of the whole sweep (box.h) or at both ends of the motion (motion_box.h).
+// The box of a primitive from those of its vertices: of the whole sweep (box.h) or at both ends of the motion
+// (motion_box.h).
 template <class AnyBox>
 AnyBox primitive_box(const Features& features, const std::vector<AnyBox>& vertex_boxes, std::uint32_t c) {
   if (c >= features.first_lone_vertex()) return vertex_boxes[features.lone_vertices[c - features.first_lone_vertex()]];

@@ -19,7 +19,7 @@ Bounds load(const MotionBox& b) {
   return r;
 }
 
-// The smaller of two where the bound is a low one, else the larger.
+// The smaller of two values for a low bound, the larger for a high one.
 template <std::uint32_t part>
 Floats4 join_part(Floats4 a, Floats4 b) {
   const Floats4 low = min4(a, b), high = max4(a, b);
@@ -44,7 +44,7 @@ Columns transposed(const Floats4 (&r)[4]) {
            __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7)}};
 }
 
-// Three coordinates of four corners, from where they begin in a box on; `skip`: after so many others.
+// Three coordinates of four corners, from their offset in a box; `skip`: number of corners before them.
 template <std::uint32_t skip>
 void fill_rows(const MotionBox* const (&corner)[4], std::uint32_t from, CornerRow* rows, std::uint32_t lane) {
   Floats4 r[4];
@@ -53,14 +53,14 @@ void fill_rows(const MotionBox* const (&corner)[4], std::uint32_t from, CornerRo
   for (std::uint32_t k = 0; k < 3; ++k) std::memcpy(&rows[k].lane[lane], &c.row[k + skip], sizeof c.row[k]);
 }
 
-// Where the corners of a leaf lie the processor cannot guess, and other cores have written there last: a tenth of the
-// refit of 18 K triangles on four cores, a fiftieth on one.
+// Prefetches the corners of a leaf: hardware does not predict their addresses, and other cores have written there last.
+// Saves a tenth of the refit of 18 K triangles on four cores, a fiftieth on one.
 void fetch_ahead(const Tree& tree, const LeafRange& leaf, const std::vector<MotionBox>& vertex_boxes) {
   for (std::uint32_t c = leaf.first_corner; c < leaf.end_corner; ++c)
     __builtin_prefetch(&vertex_boxes[tree.corners[c]]);
 }
 
-// Rows are filled four corners at a time, the last ones up with copies.
+// Rows are filled four corners at a time, and padded with copies.
 MotionBox leaf_bounds(const Tree& tree, const LeafRange& leaf, const std::vector<MotionBox>& vertex_boxes) {
   constexpr std::uint32_t t1 = n_bounds / 2, high = 3, n = Tree::coordinates;
   Bounds whole = load(MotionBox());
@@ -83,8 +83,8 @@ MotionBox leaf_bounds(const Tree& tree, const LeafRange& leaf, const std::vector
   return box;
 }
 
-// Grows k-DOPs by half a separation on each side, like boxes: then leaves whose k-DOPs are apart have no two features
-// that come within the separation of each other. The k-DOPs of features are compared with the same (KdopMargin).
+// Grows k-DOPs by half a separation on each side, like boxes: leaves with separated k-DOPs then contain no two features
+// that come within the separation of each other. The k-DOPs of features are compared with the same margin (KdopMargin).
 KdopMargin margin_of(const MotionBounds& motion, std::uint32_t mesh) {
   return {motion.margin_of_mesh(mesh) + motion.rounding, motion.map.scale};
 }
@@ -120,13 +120,14 @@ void fit_leaf(Tree& tree, std::uint32_t number, const MotionBounds& motion) {
   for (std::uint32_t i = 0; i < n_bounds; ++i) block.rows[i][number - block.first_leaf] = bounds[i];
 }
 
-// For bounds of this kind: with separations or without, of a motion or a snapshot. True where it held such before.
+// Allocates memory for bounds of this kind: with or without separations, of a motion or a snapshot. True if it was
+// allocated before.
 bool make_room(Tree& tree, const MotionBounds& motion, const Cancellation& cancellation) {
   const bool with_kdops = motion.has_kdops();
   tree.bent = !motion.squeezed.empty();
   const bool same_rows = tree.rows && tree.grown == motion.grown;
   if (same_rows && tree.by_kdops == with_kdops) return true;
-  tree.by_kdops = false;  // should there be no memory
+  tree.by_kdops = false;  // if memory runs out below
   if (!same_rows) {
     tree.rows.reset();
     tree.grown = motion.grown;
@@ -142,7 +143,7 @@ void join_children(Tree& tree, Node& node) {
   node.box.include(tree.nodes[node.children + 1].box);
 }
 
-// Returns the sum of the areas of its nodes.
+// Returns the sum of the areas of the nodes.
 double refit_subtree(Tree& tree, std::uint32_t root, const MotionBounds& motion) {
   Node& node = tree.nodes[root];
   if (!node.children) {
@@ -156,8 +157,9 @@ double refit_subtree(Tree& tree, std::uint32_t root, const MotionBounds& motion)
   return left + right + node.box.area();
 }
 
-// Up from a subtree that is done: of two siblings whoever comes second goes on. A serial pass over the nodes above the
-// front, whose children other cores have written last, took a tenth of the refit of 18 K triangles on four cores.
+// Refits the nodes above a finished subtree: of two siblings the thread that finishes second continues. A serial pass
+// over the nodes above the front, whose children other cores have written last, took a tenth of the refit of 18 K
+// triangles on four cores.
 void refit_above(Tree& tree, std::uint32_t number) {
   while (number != Tree::none) {
     Tree::AboveFront& above = tree.above_front[number];

@@ -32,14 +32,15 @@ void split_along(int axis, Centroid* set, std::uint32_t n, std::uint32_t left, c
     const float xa = a.center[axis], xb = b.center[axis];
     return xa < xb || (xa == xb && a.number < b.number);
   };
-  constexpr std::uint32_t many = 1 << 16;  // where all lie in one place
+  constexpr std::uint32_t many = 1 << 16;  // if all centroids coincide
   if (n < many)
     std::nth_element(set, set + left, set + n, before);
   else
     std::nth_element(set, set + left, set + n, heeding(cancellation, before));
 }
 
-// Equal steps along an axis. Rounding keeps the order, so nothing in a bucket lies below anything in the one before.
+// Equal intervals along an axis. Rounding keeps the order, so no element of a bucket is below an element of the
+// previous one.
 class Buckets {
  public:
   static constexpr std::uint32_t number = 1024;
@@ -56,7 +57,7 @@ class Buckets {
   double low_, per_length_;  // the smallest length that a float can have would overflow one
 };
 
-// Part of a set: what it holds, and where its next ones go below, in and above the bucket that is cut.
+// Part of a set: its counts, and the positions of its next elements below, in and above the bucket that is split.
 struct Piece {
   std::uint32_t begin, end;
   Box box;
@@ -64,8 +65,8 @@ struct Piece {
   std::uint32_t next[3];
 };
 
-// Counts by bucket, moves each to its side of the bucket with the cut, and sorts out that one alone: without a branch
-// that depends on the data. for_pieces(f) calls f(piece) for each.
+// Counts by bucket, moves each element to its side of the bucket with the split, and sorts that bucket only, without
+// data-dependent branches. for_pieces(f) calls f(piece) for each piece.
 template <class ForPieces>
 void split_by_buckets(Centroid* set, std::uint32_t left, Centroid* scratch, std::vector<Piece>& pieces,
                       const Cancellation& cancellation, ForPieces&& for_pieces) {
@@ -98,7 +99,7 @@ void split_by_buckets(Centroid* set, std::uint32_t left, Centroid* scratch, std:
   if (left > below) split_along(axis, set + below, inside, left - below, cancellation);
 }
 
-// Not touched yet, but for where they begin and end.
+// Pieces with their ranges only.
 std::vector<Piece> pieces_of(std::uint32_t n, std::size_t number) {
   std::vector<Piece> pieces(number);
   for (std::size_t p = 0; p < number; ++p) {
@@ -111,7 +112,7 @@ std::vector<Piece> pieces_of(std::uint32_t n, std::size_t number) {
 }  // namespace
 
 void split(Centroid* set, std::uint32_t n, std::uint32_t left, Centroid* scratch, const Cancellation& cancellation) {
-  constexpr std::uint32_t few = 2 * Buckets::number;  // going through the buckets costs more
+  constexpr std::uint32_t few = 2 * Buckets::number;  // buckets cost more for small sets
   if (n < few) return split_along(widest_axis(box_of(set, n)), set, n, left, cancellation);
   constexpr std::uint32_t longest_piece = 1 << 18;  // 1 ms
   std::vector<Piece> pieces = pieces_of(n, n / longest_piece + 1);

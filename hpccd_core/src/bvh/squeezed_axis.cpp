@@ -8,7 +8,8 @@
 namespace hpccd {
 namespace {
 
-// The length to which longer gaps are shortened so that `wanted` remains of `length`. `gaps`: those above `least`.
+// The length to which longer gaps are shortened so that the total is `wanted` instead of `length`. `gaps`: those above
+// `least`.
 double longest_gap(std::vector<double>& gaps, double length, double wanted, double least) {
   std::ranges::sort(gaps, std::greater());
   double without = length;  // length without the gaps that are shortened
@@ -47,7 +48,7 @@ SqueezedAxis::SqueezedAxis(std::vector<Stretch>& stretches, double wanted, doubl
   }
 }
 
-// Monotonic: each operation keeps the order of numbers.
+// Monotonic, since each operation is.
 float SqueezedAxis::operator()(double x) const {
   auto segment = std::ranges::upper_bound(segments_, x, {}, &Segment::low);
   if (segment != segments_.begin()) --segment;

@@ -23,18 +23,18 @@ class SqueezedAxis {
   // Shortens gaps until the length is `wanted`, but none to less than `least`. Sorts the stretches.
   SqueezedAxis(std::vector<Stretch>& stretches, double wanted, double least);
 
-  // With shortened gaps.
+  // The length with shortened gaps.
   double length() const { return length_; }
-  // A power of two by which lengths are multiplied.
+  // Sets a power of two by which lengths are multiplied.
   void set_scale(double scale) { scale_ = scale; }
-  // Around zero.
+  // The mapped coordinate, centred around zero.
   float operator()(double x) const;
   bool operator==(const SqueezedAxis&) const = default;
 
  private:
   struct Segment {
-    double low, high;   // in the scene
-    double begin, end;  // where the low end is mapped to, and where the next segment begins
+    double low, high;   // in coordinates of the scene
+    double begin, end;  // the mapped low end, and the start of the next segment
     bool operator==(const Segment&) const = default;
   };
   std::vector<Segment> segments_;

@@ -19,34 +19,34 @@
 
 namespace hpccd {
 
-// A reach along the axes, along the slanted directions of a snapshot: they are longer by the root of two, and their
-// coordinates twice as large, with roundings to match.
+// A reach along the slanted directions of a snapshot: they are longer than the axes by the root of two, and their
+// coordinates are twice as large, with corresponding rounding errors.
 HPCCD_HD float slanted_reach(float reach) { return 1.41422f * reach; }
 
 // One cache line.
 struct alignas(64) Node {
   MotionBox box;
-  std::uint32_t children = 0;  // the left one; the right one follows. 0: a leaf
-  std::uint32_t leaf = 0;      // its number; of an inner node the first one below it
+  std::uint32_t children = 0;  // the left child; the right one follows it. 0: a leaf
+  std::uint32_t leaf = 0;      // number of the leaf; of an inner node, of the first leaf below it
   std::uint32_t mesh = mixed_meshes;
-  std::uint32_t primitives : 31 = 0;  // in the whole subtree
-  std::uint32_t only_points : 1 = 0;  // no triangle and no edge in it, so nothing that another such node could touch
+  std::uint32_t primitives : 31 = 0;  // number of primitives in the whole subtree
+  std::uint32_t only_points : 1 = 0;  // contains no triangle and no edge, so no pair of such nodes can touch
 
-  bool overlaps(const Node& other) const;  // as MotionBox::overlaps
+  bool overlaps(const Node& other) const;  // see MotionBox::overlaps
   // Whether they overlap by more than `excess` along each axis.
   bool overlaps(const Node& other, float excess) const;
-  // The same up to a time below 1, from the start on.
+  // The same up to a time below 1, from the start of the motion.
   bool overlap_until(const Node& other, float time) const;
-  // At the start, no farther apart than `reach` along any axis.
+  // Whether the boxes at the start are at most `reach` apart along every axis.
   bool near_at_start(const Node& other, float reach) const;
-  // Of one snapshot: no farther apart than `reach` along any axis and any of the slanted directions (kdop.h).
+  // For one snapshot: at most `reach` apart along every axis and all slanted directions (kdop.h).
   bool near_in_snapshot(const Node& other, float reach) const;
-  // At the start, the square of the Euclidean distance of the boxes.
+  // The square of the Euclidean distance of the boxes at the start.
   float square_of_gap(const Node& other) const;
 };
 static_assert(sizeof(Node) == 64);
 
-// Four numbers are loaded where three count: the one behind the last bound is `children`.
+// Loads four numbers where three are used: the one after the last bound is `children`.
 inline bool Node::overlaps(const Node& other) const {
   const auto below = [](const MotionBox& a, const MotionBox& b) {  // a before b at both ends, by axis
     return (load4(a.t0.high) < load4(b.t0.low)) & (load4(a.t1.high) < load4(b.t1.low));
@@ -62,8 +62,8 @@ inline bool Node::overlaps(const Node& other, float excess) const {
   return (bits4(below(box, other.box) | below(other.box, box)) & 7) == 0;
 }
 
-// By how much boxes between both ends must be apart, so that the features are. Coordinates, below 2.25 and by a large
-// separation below 6.25, are rounded to floats and interpolated in floats: of a gap that leaves 3.1e-6 at most.
+// The gap between interpolated boxes that proves that the features are apart. Coordinates, below 2.25 and with a large
+// separation below 6.25, are rounded to floats and interpolated in floats: the error of a gap is at most 3.1e-6.
 inline constexpr float between_ends = 4e-6f;
 
 inline bool Node::overlap_until(const Node& other, float time) const {
@@ -101,10 +101,10 @@ inline float Node::square_of_gap(const Node& other) const {
   return along[0] * along[0] + along[1] * along[1] + along[2] * along[2];
 }
 
-// The corners of a leaf are the distinct vertices of its features: nine or ten where eight triangles hang together. All
-// that is kept of a leaf's geometry is where they are, a row for each coordinate, sixteen in the lanes of a row; boxes
-// of features are made from them where two leaves overlap (leaf_features.inl). That is a quarter of the memory that
-// boxes of all features take, and a third of the time to refit them.
+// The corners of a leaf are the distinct vertices of its features: nine or ten if eight triangles are connected. Their
+// positions are the only geometry of a leaf that is stored: a row for each coordinate, with sixteen corners in the
+// lanes of a row. Boxes of features are computed from them when two leaves overlap (leaf_features.inl). This takes a
+// quarter of the memory of boxes of all features, and a third of the time to refit them.
 struct alignas(64) CornerRow {
   static constexpr std::uint32_t width = 16;
   float lane[width];
@@ -113,7 +113,7 @@ struct alignas(64) CornerRow {
 struct LeafRange {
   std::uint32_t first_face, end_face, first_edge, end_edge, first_vertex, end_vertex;  // slots
   std::uint32_t first_corner = 0, end_corner = 0;
-  std::uint32_t first_group = 0;  // of rows: one for every sixteen corners
+  std::uint32_t first_group = 0;  // index of rows: one for every sixteen corners
 
   HPCCD_HD std::uint32_t n_faces() const { return end_face - first_face; }
   HPCCD_HD std::uint32_t n_edges() const { return end_edge - first_edge; }
@@ -122,8 +122,8 @@ struct LeafRange {
   HPCCD_HD std::uint32_t n_groups() const { return (n_corners() + CornerRow::width - 1) / CornerRow::width; }
 };
 
-// Which corners of their leaf its features have, by number within the leaf; zeros behind the last. Its vertices are the
-// first corners themselves. And the other way round: a bit for each feature that has a corner.
+// The corners of each feature of a leaf, by number within the leaf, padded with zeros. Its vertices are the first
+// corners themselves. And the inverse: for each corner, one bit for each feature that has it.
 struct alignas(64) CornersOf {
   static constexpr std::uint32_t most_edges = 32, most_faces = 16;  // multiples of CornerRow::width
   static constexpr std::uint32_t most_corners = 24;
@@ -134,7 +134,7 @@ struct alignas(64) CornersOf {
 static_assert(sizeof(CornersOf) == 256);
 
 // The leaves below one node, up to sixteen of one mesh, with their boxes in lanes, a row for each bound: pairs of
-// leaves are looked for sixteen at a time, in place of the last four levels of the tree.
+// leaves are searched sixteen at a time, in place of the last four levels of the tree.
 struct alignas(64) Block {
   static constexpr std::uint32_t width = 16;
   float rows[n_bounds][width];
@@ -142,10 +142,10 @@ struct alignas(64) Block {
 };
 
 struct Tree {
-  // Primitives of a leaf. With 8, its corners and its edges mostly fill a row each, and each of at most 24 edges has a
-  // lane of a GPU's warp.
+  // Primitives of a leaf. With 8, its corners and its edges mostly fill one row each, and each of at most 24 edges has
+  // a lane of a GPU's warp.
   static constexpr std::uint32_t leaf_size = 8;
-  static constexpr std::uint32_t load_width = CornerRow::width;  // numbers of features are loaded as many at a time
+  static constexpr std::uint32_t load_width = CornerRow::width;  // number of feature indices that are loaded at once
   static_assert(3 * leaf_size <= 2 * CornerRow::width && 3 * leaf_size <= CornersOf::most_edges &&
                 leaf_size <= CornersOf::most_faces && 3 * leaf_size <= CornersOf::most_corners);
 
@@ -153,17 +153,17 @@ struct Tree {
   static constexpr std::uint32_t none = 0xFFFFFFFFu;
 
   // A front of subtrees, each within one mesh, that are refitted by one thread each (Kim et al. 2009, section 6), in
-  // the order of their leaves. The same for any number of threads, so that sums of areas are.
+  // the order of their leaves. It does not depend on the number of threads, so neither do sums of areas.
   struct Subtree {
     std::uint32_t root;
     std::uint32_t above;  // its parent, by number in above_front, or none
     double area = 0;      // sum over its nodes
   };
   std::vector<Subtree> front;
-  // The nodes above it. Whoever finishes the second child of one refits that as well.
+  // The nodes above the front. The thread that finishes the second child of a node refits that node as well.
   struct AboveFront {
     std::uint32_t node;
-    std::uint32_t above;  // as in Subtree
+    std::uint32_t above;  // see Subtree
     std::uint32_t half_done = 0;
     double area = 0;
   };
@@ -173,15 +173,15 @@ struct Tree {
   std::vector<Block> blocks;
   std::vector<std::uint32_t> block_of_leaf;
   const Node& node_of_leaf(std::uint32_t leaf) const { return nodes[leaf_nodes[leaf]]; }
-  // Whether a node is a block's, or below one.
+  // Whether a node is a block, or below one.
   static bool in_block(const Node& node) {
     return node.mesh != mixed_meshes && node.primitives <= Block::width * leaf_size;
   }
   // Slots: features in the order of the leaves; each array ends with load_width slots of padding.
   std::vector<std::uint32_t> face_of_slot, edge_of_slot, vertex_of_slot;
-  std::vector<std::uint32_t> corners;  // vertex numbers, leaf by leaf: first those of its vertices
+  std::vector<std::uint32_t> corners;  // vertex numbers, leaf by leaf, starting with the leaf's own vertices
   std::vector<CornersOf> corners_of;   // by leaf
-  // Of each group a row for each coordinate at both ends; where boxes of vertices are grown these are the low bounds,
+  // For each group, a row for each coordinate at both ends. If boxes of vertices have grown, these are the low bounds,
   // and the high bounds follow.
   std::unique_ptr<CornerRow[]> rows;
   std::size_t n_groups = 0;
@@ -194,24 +194,24 @@ struct Tree {
   HPCCD_HD CornerRow* rows_of(const LeafRange& leaf) const {
     return rows.get() + std::size_t{leaf.first_group} * rows_per_group();
   }
-  double area = 0;  // sum over nodes, relative to the root's: what traversal pays grows with it
+  double area = 0;  // sum over nodes, relative to the root's area: the cost of traversal grows with it
   double area_when_built = 0;
 
   std::size_t bytes() const;
 };
 
-// Whether refitting has lost so much that a new tree costs less: traversal visits node pairs about in proportion to the
-// nodes' area, and half as much again costs more than a build. Areas relative to the root's.
+// Whether refitting has degraded the tree so much that a new one costs less: the number of visited node pairs is about
+// proportional to the nodes' area, and half as much again costs more than a build. Areas are relative to the root's.
 inline bool worn_out(double area, double area_when_built) { return area > 1.5 * area_when_built; }
 
-// A new tree over the current bounds of the motion of each vertex.
+// Builds a new tree over the current bounds of the motion of each vertex.
 void build(Tree& tree, const Scene& scene, const Features& features, const MotionBounds& motion, ThreadPool& pool);
 
-// The same tree with new bounds, bottom up (Kim et al. 2009, section 6, parallel BVH update). `resting`: by mesh, true
-// where vertex boxes are as they were at the last call; empty: of none.
+// Updates the bounds of the same tree, bottom up (Kim et al. 2009, section 6, parallel BVH update). `resting`: by mesh,
+// whether vertex boxes are unchanged since the previous call; empty: no mesh.
 void refit(Tree& tree, const MotionBounds& motion, const std::vector<char>& resting, ThreadPool& pool);
 
-// The boxes of some leaves alone.
+// Updates the boxes of some leaves only.
 void refit_leaves(Tree& tree, const MotionBounds& motion, std::span<const std::uint32_t> leaves, ThreadPool& pool);
 
 }  // namespace hpccd
