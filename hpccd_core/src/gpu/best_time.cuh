@@ -8,10 +8,10 @@
 
 namespace hpccd::gpu {
 
-// Bits of numbers of at least zero are in the order of the numbers.
+// The bits of non-negative numbers have the order of the numbers.
 __device__ inline u64 bits_of(double x) { return static_cast<u64>(__double_as_longlong(x)); }
 
-// All lanes must call. No time: infinity.
+// All lanes must call. Infinity means no time.
 __device__ inline void keep_soonest(u64* counter, double time) {
   u64 soonest = time < INFINITY ? ~bits_of(time) : 0;
   for (int d = 16; d > 0; d /= 2) soonest = max(soonest, __shfl_xor_sync(all_lanes, soonest, d));
@@ -30,7 +30,7 @@ __device__ double until(const LaunchParams<T>& params) {
   return fmin((best_time(params) + same_time) * (1 + 1e-12), 1.0);
 }
 
-// What touches so soon after the earliest is a good hint for the next frame.
+// Contacts this soon after the earliest are good hints for the next frame.
 inline constexpr double soon = 1.0 / 64;
 
 // Whether a contact is kept: it may be among the earliest, or is such a hint.
@@ -39,13 +39,13 @@ __device__ bool counts_at(const LaunchParams<T>& params, double time) {
   return !params.until_best || time <= best_time(params) + soon;
 }
 
-// Nothing that is found could matter any more; or the frame is refused, where all boxes may overlap.
+// Whether no further result can matter, or the frame is rejected, in which case all boxes may overlap.
 template <class T>
 __device__ bool over(const LaunchParams<T>& params) {
   return params.counters->bad != 0 || (params.time_only && best_time(params) <= 0);
 }
 
-// Of what the error bounds have proven, before the fallback goes on.
+// The best time that error bounds have proven, before the fallback runs.
 template <class T>
 __global__ void soonest_kernel(LaunchParams<T> params) {
   const u64 n = length(params.counters->found_all, params.found_capacity),

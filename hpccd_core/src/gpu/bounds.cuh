@@ -13,9 +13,9 @@
 
 namespace hpccd::gpu {
 
-// How far a world reaches in a frame, as its counters have it, and the map of its coordinates that follows.
+// The extent of a world in a frame, from its counters, and the resulting map of its coordinates.
 
-// Bits of a double whose order as integers is the order of the numbers.
+// Maps the bits of a double to an integer with the order of the numbers.
 __device__ inline u64 ordered_bits(double x) {
   const u64 b = static_cast<u64>(__double_as_longlong(x));
   return b >> 63 ? ~b : b | (u64{1} << 63);
@@ -39,7 +39,7 @@ struct SceneExtent {
   }
 };
 
-// The same number of blocks for each world.
+// Uses the same number of blocks for each world.
 template <class T>
 __global__ void extent_kernel(LaunchParams<T> params) {
   double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
@@ -83,8 +83,8 @@ __device__ inline void set_ends(GivenEnds<double>& r, const double* a, const dou
   r.t0[0] = {a[0], a[1]}, r.t0[1] = {a[2], 0}, r.t1[0] = {b[0], b[1]}, r.t1[1] = {b[2], 0};
 }
 
-// Where a vertex is at a time between its ends, and what rounding this to a float, once more where the box of another
-// grows by it, can lose: half of 2^-22 each of the three times for coordinates up to 2.25.
+// The position of a vertex at a time between its ends, and the rounding errors of this number as a float (and of
+// growing another vertex's box by it): half of 2^-22 for each of the three operations, for coordinates up to 2.25.
 __device__ inline float place_at(double time, double t0, double t1) {
   return static_cast<float>(t0 + time * (t1 - t0));
 }
@@ -97,7 +97,7 @@ __device__ double extent_of(const T* from, const T* to) {
   return length;
 }
 
-// backends/short_edge.cpp, a block a world: whose length has the right number below it says what follows.
+// scene/edge_sample.h, one block per world: the edge with the right number of shorter ones decides.
 template <class T>
 __global__ void floats_suffice_kernel(LaunchParams<T> params) {
   __shared__ double lengths[2 * edges_of_a_step];
@@ -121,7 +121,7 @@ __global__ void floats_suffice_kernel(LaunchParams<T> params) {
   }
 }
 
-// kdops: of a frame that asks for them.
+// kdops: for frames that need them.
 template <bool snapshot, bool kdops, class T>
 __global__ void vertices_kernel(LaunchParams<T> params) {
   const u32 i = blockIdx.x * blockDim.x + threadIdx.x;

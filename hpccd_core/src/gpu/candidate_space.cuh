@@ -8,7 +8,7 @@
 
 namespace hpccd::gpu {
 
-// A leaf of one world, and the vertex of the lane's corner.
+// A leaf of one world, and the vertex of each lane's corner.
 struct LeafCorners {
   DeviceLeaf leaf;
   u32 corner;
@@ -27,13 +27,13 @@ __device__ __forceinline__ LeafFeature load_feature(const LeafFeature* features,
   return {f.x, f.y};
 }
 
-// The vertices of the lane's edge or face; the third of an edge is no matter. All lanes must call.
+// The vertices of the lane's edge or face; the third is unused for an edge. All lanes must call.
 __device__ __forceinline__ VertexNumbers vertices_of_corners(const LeafCorners& l, u32 corners) {
   return {{__shfl_sync(all_lanes, l.corner, corners & 31), __shfl_sync(all_lanes, l.corner, corners >> 8 & 31),
            __shfl_sync(all_lanes, l.corner, corners >> 16 & 31)}};
 }
 
-// Its box, with the first two vertices as tags.
+// The box of the feature, with the first two vertices as tags.
 template <class T>
 __device__ __forceinline__ DeviceBox feature_box(const LaunchParams<T>& params, const VertexNumbers& v, bool is_face) {
   DeviceBox b = load_point<true>(&params.points[v[0]]);
@@ -46,16 +46,16 @@ __device__ __forceinline__ DeviceBox feature_box(const LaunchParams<T>& params, 
 inline constexpr u32 candidate_warps = 4;
 static_assert(3 * Tree::leaf_size <= 32, "a lane for each feature of a leaf");
 
-// Candidates that wait for the filter, and those that passed it.
+// Candidates that wait for the filter, and those that have passed it.
 struct CandidateQueue {
-  uint4 vertices[64];  // those that p, a and b lead from and to (span_ends); not of a snapshot
+  uint4 vertices[64];  // the vertices where p, a and b begin and end (span_ends); unused for snapshots
   uint2 features[64];
   uint2 survivors[2][96];
 };
 
 struct CandidateSpace : CandidateQueue {
   // Features of the two leaves that overlap the other leaf, and their numbers in their world. The four words of a box
-  // lie apart, so that neighbouring lanes read neighbouring words.
+  // are stored separately, so that neighbouring lanes read neighbouring words.
   Bound bound[2][4][3 * Tree::leaf_size];
   u32 number[2][3 * Tree::leaf_size];
   u32 corner2[Tree::leaf_size];
@@ -70,7 +70,7 @@ struct CandidateSpace : CandidateQueue {
   }
 };
 
-// Edges of a leaf that overlap the leaf `other`, one after the other in list `side`.
+// Appends the edges of a leaf that overlap the leaf `other` to list `side`.
 template <Query query, class T>
 __device__ u32 stage_edges(const LaunchParams<T>& params, const LeafCorners& l, u32 other, CandidateSpace& s,
                            u32 side) {

@@ -12,7 +12,7 @@
 
 namespace hpccd::gpu {
 
-// What a warp carries along.
+// The state of a warp.
 struct CandidateState {
   u32 n = 0, n_survivors[2] = {0, 0};
   u32 tested[2] = {0, 0};
@@ -29,7 +29,7 @@ __device__ void flush_survivors(const LaunchParams<T>& params, CandidateQueue& s
   __syncwarp();
 }
 
-// Of the vertices of a pair (pair_vertices.h): the one where p and a start, then those where p, a and b end.
+// Of the vertices of a pair (pair_vertices.h): the common start of p and a, then the ends of p, a and b.
 template <Kind kind>
 __device__ __forceinline__ uint4 span_ends(u32 v0, u32 v1, u32 v2, u32 v3) {
   using S = Spans<kind>;
@@ -38,8 +38,8 @@ __device__ __forceinline__ uint4 span_ends(u32 v0, u32 v1, u32 v2, u32 v3) {
   return {v[S::p_from], v[S::p_to], v[S::a_to], v[S::b_to]};
 }
 
-// The motion of one vertex as the first filter sees it: it is proven in double precision, all else is asked in single
-// precision first.
+// The motion of one vertex for the first filter: proven filters run in double precision, all others in single precision
+// first.
 template <class Policy, class T>
 __device__ __forceinline__ auto load_for_filter(const LaunchParams<T>& params, u32 v) {
   if constexpr (std::is_same_v<Policy, Proven>)
@@ -48,7 +48,7 @@ __device__ __forceinline__ auto load_for_filter(const LaunchParams<T>& params, u
     return load_rounded_ends(params.points, v);
 }
 
-// Whether the first filter lets a pair pass. One piece of code for both kinds: they differ in where b starts.
+// Whether a pair passes the first filter. One piece of code for both kinds, which differ in the start of b.
 template <Query query, class Policy, class T>
 __device__ __forceinline__ bool passes_filter(const LaunchParams<T>& params, uint4 v, bool edges) {
   const auto from = load_for_filter<Policy>(params, v.x), p = load_for_filter<Policy>(params, v.y),
@@ -56,12 +56,12 @@ __device__ __forceinline__ bool passes_filter(const LaunchParams<T>& params, uin
   using R = decltype(from.t0.x);
   const Vec3<R> b_from0 = edges ? p.t0 : from.t0, b_from1 = edges ? p.t1 : from.t1;
   const Motion<R> m{p.t0 - from.t0, a.t0 - from.t0, b.t0 - b_from0, p.t1 - from.t1, a.t1 - from.t1, b.t1 - b_from1};
-  // Without a separation both say the same, in every bit.
+  // Without a separation both tests are bit-identical.
   if constexpr (query == Query::separations) return !planes_stay_apart(m, separation_of(params, v.x, v.y));
   return !coplanarity_filter<Policy>(m).none;
 }
 
-// The last up to 32 candidates.
+// Tests the last candidates, at most 32.
 template <Query query, class Policy, class T>
 __device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params, CandidateQueue& s,
                                                   CandidateState& state) {
@@ -91,7 +91,7 @@ __device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params,
   __syncwarp();
 }
 
-// What a lane proposes for the list of candidates.
+// The pair that a lane proposes for the list of candidates.
 struct LanePair {
   bool wanted;
   uint4 vertices;
@@ -101,7 +101,7 @@ struct LanePair {
 // i / n for i < 1024 and n <= 32: exact, since the error i (magic n - 65536) / (65536 n) stays below 1 / n.
 __device__ inline u32 magic_of(u32 n) { return (65536 + n - 1) / n; }
 
-// first_edge: the number of their world's first one.
+// first_edge: number of the first edge of the world.
 template <Query query>
 __device__ __forceinline__ LanePair edge_pair(const CandidateSpace& s, u32 first_edge, u32 i, u32 j, bool same,
                                               bool valid) {
@@ -131,7 +131,7 @@ __device__ __forceinline__ LanePair vertex_face_pair(const CandidateSpace& s, u3
   return c;
 }
 
-// Intersections have no order of edge and face to choose.
+// In edge-face pairs there is no order to choose.
 template <Query query>
 __device__ __forceinline__ LanePair edge_face_pair(const CandidateSpace& s, u32 first_edge, u32 i, u32 j, bool valid) {
   LanePair c{valid, {0, 0, 0, 0}, {0, 0}};
@@ -144,8 +144,8 @@ __device__ __forceinline__ LanePair edge_face_pair(const CandidateSpace& s, u32 
   return c;
 }
 
-// Features of the two leaves that may be a pair in a phase: edges, vertices of the first, vertices of the second; or
-// edges of the first and edges of the second. Returns how many there are of each side.
+// The features of the two leaves that are paired in a phase: edges, vertices of the first leaf, vertices of the second;
+// or edges of the first and edges of the second. Returns their numbers on each side.
 template <Query query, class T>
 __device__ __forceinline__ uint2 stage_phase(const LaunchParams<T>& params, CandidateSpace& s, uint2 pair, u32 phase) {
   constexpr bool edges_and_faces = query == Query::intersections;
@@ -167,8 +167,8 @@ __device__ __forceinline__ uint2 stage_phase(const LaunchParams<T>& params, Cand
   return {n_first, n_first ? stage_faces<query>(params, b, x, s) : 0};
 }
 
-// The filter stands in one place in the innermost loop: called as a function it costs 30 million spills on n-body,
-// repeated it overflows the code cache.
+// The filter occurs once, in the innermost loop: as a function it costs 30 million register spills on n-body,
+// duplicated it overflows the instruction cache.
 template <Query query, class T>
 __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& params, CandidateSpace& s,
                                                      CandidateState& state, uint2 pair) {
@@ -208,7 +208,7 @@ __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& para
   }
 }
 
-// What is left when there are no more pairs of leaves.
+// Tests the remaining candidates after the last pair of leaves.
 template <Query query, class Policy, class T>
 __device__ __forceinline__ void finish_candidates(const LaunchParams<T>& params, CandidateQueue& s,
                                                   CandidateState& state) {
@@ -220,7 +220,7 @@ __device__ __forceinline__ void finish_candidates(const LaunchParams<T>& params,
       atomicAdd(&params.counters->candidates[kind], static_cast<u64>(state.tested[kind]));
 }
 
-// A few pairs of leaves at a time, for as long as there are some in this segment.
+// Takes a few pairs of leaves at a time, until this segment has no more.
 template <class T, class Function>
 __device__ __forceinline__ void for_leaf_pairs(const LaunchParams<T>& params, Function&& function) {
   constexpr u32 grain = 8;

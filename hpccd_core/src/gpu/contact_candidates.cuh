@@ -10,7 +10,7 @@
 
 namespace hpccd::gpu {
 
-// Pairs of one kind between two lists of staged features: where the second list begins, and how long they are.
+// Pairs of one kind between two lists of staged features: the start of the second list, and the lengths of both.
 struct StagedPairs {
   u32 second, n_first, n_second;
   __device__ u32 count() const { return n_first * n_second; }
@@ -21,8 +21,8 @@ __device__ inline u32 quotient(u32 i, u32 n) {
   return static_cast<u32>((static_cast<float>(i) + 0.5f) * __frcp_rn(static_cast<float>(n)));
 }
 
-// side: of the first features, where these are vertices. first_edge: the number of their world's first one. same: of a
-// leaf with itself, where pairs of edges come twice.
+// side: of the first features, if these are vertices. first_edge: number of the first edge of the world. same: a leaf
+// paired with itself, where each pair of edges occurs twice.
 __device__ __forceinline__ LanePair staged_pair(const StagedLeaves& s, const StagedPairs& of, u32 side, u32 first_edge,
                                                 u32 c, bool edges, bool same) {
   const u32 i = quotient(c, of.n_second), j = c - i * of.n_second;
@@ -46,7 +46,7 @@ __device__ __forceinline__ LanePair staged_pair(const StagedLeaves& s, const Sta
   return pair;
 }
 
-// A pair of leaves, the first numbered through all worlds, and both as the tree has them.
+// A pair of leaves, the first numbered through all worlds, and both as numbered in the tree.
 struct LeavesOfPair {
   uint2 numbers;
   DeviceLeaf first, second;
@@ -94,7 +94,7 @@ __device__ __forceinline__ void contact_candidates(const LaunchParams<T>& params
   __syncwarp();
 }
 
-// Of a fast frame, whether the pair is one for this kernel: floats suffice for some worlds, for others not.
+// In a fast frame, whether this kernel computes the pair: floats suffice for some worlds only.
 template <class Policy, class T>
 __device__ bool is_for(const LaunchParams<T>& params, u32 world) {
   return !params.fast || (params.worlds[world].floats_suffice != 0) == std::is_same_v<Policy, Likely>;

@@ -7,7 +7,7 @@
 
 namespace hpccd::gpu {
 
-// Every CUDA call goes through here; throws Error with the call's own words.
+// Checks the result of a CUDA call; throws Error with CUDA's message.
 void check(cudaError_t result, const char* what);
 inline void check_launch(const char* kernel) { check(cudaGetLastError(), kernel); }
 

@@ -16,7 +16,7 @@ std::atomic<int> calls_until_failure{0};
 
 __global__ void probe(int* answer) { *answer = 42; }
 
-// Whether code of this build runs there: an older chip than the build's architectures says no only at a launch.
+// Whether code of this build runs on the device: on a chip older than the build's architectures only a launch fails.
 std::string why_unusable(int device) {
   cudaFuncAttributes attributes;
   cudaError_t e = cudaSetDevice(device);
@@ -71,7 +71,7 @@ class DeviceCopy final : public MemoryOnDevice {
       size_ = bytes;
     }
     if (bytes == 0) return;
-    // The default stream would wait for those of the caller.
+    // The default stream would wait for the caller's streams.
     if (!stream_) check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
     check(cudaMemcpyAsync(data_, from, bytes, cudaMemcpyDefault, stream_), "cudaMemcpyAsync");
     check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
@@ -122,7 +122,7 @@ void check(cudaError_t result, const char* what) {
   if (calls_until_failure.load(std::memory_order_relaxed) > 0 && calls_until_failure.fetch_sub(1) == 1)
     throw Error(std::string(what) + ": failure asked for by a test");
   if (result == cudaSuccess) return;
-  cudaGetLastError();  // not sticky errors: the next call starts clean
+  cudaGetLastError();  // clears errors that are not sticky
   throw Error(std::string(what) + ": " + cudaGetErrorString(result));
 }
 

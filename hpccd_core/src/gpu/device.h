@@ -16,22 +16,22 @@ struct Device {
 };
 
 struct Status {
-  bool compiled = false;        // this build holds CUDA code
-  std::string toolkit;          // which version, and for which architectures
-  std::vector<Device> devices;  // the ones that run this build's code
-  std::string reason;           // why there are none; empty where there are
+  bool compiled = false;        // whether this build contains CUDA code
+  std::string toolkit;          // CUDA's version, and the architectures
+  std::vector<Device> devices;  // the devices that can run this build's code
+  std::string reason;           // why there are none; empty if there are any
 };
 
-// Looked up once. Never throws: a machine without GPU is an answer, not an error.
+// Determined once. Never throws: a machine without a GPU is no error.
 const Status& status();
 
-// A failed CUDA call or a full device memory. The frame it belongs to can be finished on the CPU.
+// A failed CUDA call, or exhausted device memory. The CPU can complete the frame.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// Puts the thread's current device back at the end: other users of CUDA in the thread (CuPy, PyTorch) rely on it.
+// Restores the thread's current device at the end: other users of CUDA in the thread (CuPy, PyTorch) rely on it.
 class CallersDevice {
  public:
   CallersDevice();
@@ -43,7 +43,7 @@ class CallersDevice {
   int device_ = -1;  // none, or unknown
 };
 
-// For tests: lets the n-th of the next checked CUDA calls fail (1: the next one; 0: none).
+// For tests: makes the n-th of the next checked CUDA calls fail (1: the next one; 0: none).
 void fail_after(int checked_calls);
 
 }  // namespace hpccd::gpu

@@ -8,14 +8,15 @@
 
 namespace hpccd::gpu {
 
-// A 16-byte word; what the tags of a box hold depends on the list.
+// A 16-byte word; the meaning of a box's tags depends on the list.
 struct alignas(16) Bound {
   float x[3];
   u32 tag;
 };
 
-// Where a vertex is at both ends of its motion, or of the part of it that matters; of a snapshot, where it is along the
-// axes, and along the slanted directions (bvh/kdop.h). The tags hold by how much its box grows there (a float).
+// The position of a vertex at both ends of its motion, or of the part that matters; for a snapshot, its coordinates
+// along the axes and along the slanted directions (bvh/kdop.h). The tags hold the amount by which its box grows there
+// (a float).
 struct alignas(32) DevicePoint {
   Bound at[2];
 };
@@ -36,13 +37,13 @@ __device__ inline DeviceBox load_box(const DeviceBox* b) {
   return {{bound_of(v[0]), bound_of(v[1])}, {bound_of(v[2]), bound_of(v[3])}};
 }
 
-// Past this multiprocessor's own cache: written by another one in the same kernel.
+// Bypasses this multiprocessor's cache: another one wrote the box in the same kernel.
 __device__ inline DeviceBox load_box_fresh(const DeviceBox* b) {
   const float4* v = reinterpret_cast<const float4*>(b);
   return {{bound_of(__ldcg(v)), bound_of(__ldcg(v + 1))}, {bound_of(__ldcg(v + 2)), bound_of(__ldcg(v + 3))}};
 }
 
-// The box of one vertex. The tags of a grown one are to be set.
+// The box of one vertex. The caller must set the tags of a grown one.
 template <bool grown>
 __device__ inline DeviceBox load_point(const DevicePoint* p) {
   const float4* v = reinterpret_cast<const float4*>(p);
@@ -71,7 +72,7 @@ __device__ inline void include(DeviceBox& a, const DeviceBox& b) {
     }
 }
 
-// Of a motion: not in the same order along an axis at both ends. Of a snapshot: along no direction apart.
+// For a motion: not in the same order along an axis at both ends. For a snapshot: not separated along any direction.
 template <Query query>
 __device__ inline bool overlap(const DeviceBox& a, const DeviceBox& b) {
   bool apart = false;

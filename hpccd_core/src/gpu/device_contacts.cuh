@@ -17,7 +17,7 @@ namespace hpccd::gpu {
 
 class DeviceContacts {
  public:
-  // n_groups: vertices and edges of all worlds. on_device: rows stay there, and are handed out.
+  // n_groups: vertices and edges of all worlds. on_device: rows stay there, and are returned to the caller.
   DeviceContacts(u32 key_bits, std::size_t n_groups, u32 n_worlds, bool on_device)
       : key_bits_(static_cast<int>(key_bits)), n_groups_(n_groups), n_worlds_(n_worlds), pool_(on_device) {
     if (n_groups >= 0x7FFFFFFF) throw Error("2^31 or more vertices and edges in all worlds; use backend=\"cpu\"");
@@ -27,25 +27,25 @@ class DeviceContacts {
     sum_workspace_.reserve(sum_workspace(static_cast<int>(n_groups + 1)));
   }
 
-  // Room for n to be found.
+  // Allocates memory for n contacts.
   void reserve(std::size_t n) {
     if (n <= capacity_) return;
     if (n > 0x7FFFFFFF) throw Error("more than 2^31 contacts; use backend=\"cpu\"");
-    capacity_ = 0;  // should one of these fail, the others have changed
+    capacity_ = 0;  // if one of these fails, the others have changed
     keys_.reserve(n);
     tocs_.reserve(n);
     placed_.reserve(n);
     capacity_ = n;
   }
 
-  // Makes room where there was too little. True where the frame must run again.
+  // Enlarges lists that were too short. True if the frame must run again.
   bool grow(const Counters& c) {
     if (c.found_all <= capacity_) return false;
     reserve(c.found_all + c.found_all / 4);
     return true;
   }
 
-  // Places for the rows of one more frame.
+  // Provides memory for the rows of the next frame.
   void begin() {
     rows_ = nullptr, rows_ = pool_.take();
     if ((handed_out_ = rows_ != nullptr); !handed_out_) {
@@ -54,20 +54,20 @@ class DeviceContacts {
     }
     if (n_worlds_ > 1) rows_->reserve_worlds(n_worlds_);
   }
-  // Of a scene without features.
+  // The result of a scene without features.
   void find_nothing(cudaStream_t stream) const {
     if (n_worlds_ == 1) return;
     no_rows_kernel<<<blocks_for(n_worlds_ + 1, 256), 256, 0, stream>>>(n_worlds_, rows_->places());
     check_launch("no_rows_kernel");
   }
-  // counted: pairs are counted as they are found.
+  // counted: pairs are counted when they are found.
   template <class T>
   void fill(LaunchParams<T>& params, bool counted) const {
     params.found_keys = keys_.data(), params.found_tocs = tocs_.data(), params.found_capacity = capacity_;
     params.n_of_group = counted && params.wanted == Wanted::all ? n_of_group_.data() : nullptr;
   }
 
-  // After all that finds contacts: brings them in order, and writes them out if there is room for them.
+  // Sorts the contacts after all stages, and writes them if there is enough memory.
   template <class T>
   void launch(Query query, const LaunchParams<T>& params, const Stages& stages) {
     if (params.wanted != Wanted::all) launch_firsts(params, stages);
@@ -85,15 +85,15 @@ class DeviceContacts {
     launch_results(query, params, stages);
   }
 
-  // The earliest time of each world, of all that was found.
+  // The earliest time of each world among all contacts.
   template <class T>
   void launch_firsts(const LaunchParams<T>& params, const Stages& stages) {
     firsts_kernel<<<blocks(stages), 256, 0, stages.stream>>>(params);
     check_launch("firsts_kernel");
   }
 
-  // When the host has the counters: true where rows had to be written out once more, now that there is room or keys
-  // are sorted. Then the counters change again.
+  // Called when the host has read the counters: true if rows had to be written again, after memory was allocated or
+  // keys were sorted. Then the counters change again.
   template <class T>
   bool complete(Query query, const LaunchParams<T>& params, const Counters& c, const Stages& stages) {
     const auto roomy = [](u64 x) { return static_cast<std::size_t>(x + x / 4 + 1024); };
@@ -111,7 +111,7 @@ class DeviceContacts {
     return sorts || !fits;
   }
 
-  // Behind the n that were found; waits for the stream.
+  // Appends to the n contacts; waits for the stream.
   void append(std::size_t n, const std::vector<u64>& keys, const std::vector<double>& tocs, cudaStream_t stream) {
     const std::size_t more = keys.size();
     if (n + more > capacity_) {
@@ -133,7 +133,7 @@ class DeviceContacts {
     check_launch("forget_results_kernel");
   }
 
-  // For so many rows, of the last frame's result.
+  // Memory for rows, for the last frame's result.
   ResultPlaces reserve_rows(u64 n_vf, u64 n_ee) const {
     rows_->reserve(n_vf, n_ee);
     return rows_->places();
@@ -142,7 +142,7 @@ class DeviceContacts {
   std::size_t capacity() const { return capacity_; }
   PlacesOut reserve_places(u64 n_rows, Outputs outputs) const { return rows_->reserve_places(n_rows, outputs); }
 
-  // When the stream has come to its end.
+  // The result, once the stream has finished.
   FrameResult result(Query query, const Counters& c) const {
     const ResultPlaces from = rows_->places();
     FrameResult r;
@@ -174,7 +174,8 @@ class DeviceContacts {
   }
 
  private:
-  // Of 256 threads: half of what a multiprocessor holds. With all of them 30 million places take a third longer (H100).
+  // 256 threads per block: half of what a multiprocessor holds. With all of them 30 million rows take a third longer
+  // (H100).
   static unsigned blocks(const Stages& stages) { return 4 * static_cast<unsigned>(stages.multiprocessors); }
 
   template <class X>
@@ -222,18 +223,18 @@ class DeviceContacts {
   const int key_bits_;
   const std::size_t n_groups_;
   const u32 n_worlds_;
-  std::size_t capacity_ = 0;  // of what is found
+  std::size_t capacity_ = 0;  // of the contacts
   DeviceBuffer<u64> keys_;
   DeviceBuffer<double> tocs_;
   DeviceBuffer<PlacedPair> placed_;
   DeviceBuffer<u32> n_of_group_, first_of_group_;
   DeviceBuffer<unsigned char> sum_workspace_;
-  // Where a feature has more than most_of_a_feature.
+  // For features with more pairs than most_of_a_feature.
   DeviceBuffer<u64> sortable_keys_, sorted_keys_;
   DeviceBuffer<u32> numbers_, order_;
   DeviceBuffer<unsigned char> sort_workspace_;
   RowsPool pool_;
-  std::shared_ptr<ResultRows> rows_, own_;  // of the frame; those that are not handed out
+  std::shared_ptr<ResultRows> rows_, own_;  // of the frame; rows that are not returned to the caller
   bool handed_out_ = false;
 };
 

@@ -19,7 +19,7 @@ class DeviceLeaves {
   // Slots may be padded.
   void set(const Features& features, const std::vector<LeafRange>& leaves, const std::vector<u32>& face_of_slot,
            const std::vector<u32>& edge_of_slot, const std::vector<u32>& vertex_of_slot) {
-    n_ = 0;  // none, should anything below fail
+    n_ = 0;  // no leaves, if anything below fails
     std::vector<DeviceLeaf> packed;
     std::vector<u32> corners;
     std::vector<LeafFeature> edges(features.edges.size()), faces(features.faces.size());

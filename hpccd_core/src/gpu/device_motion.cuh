@@ -25,18 +25,18 @@ class DeviceMotion {
     params.vertices = reinterpret_cast<GivenEnds<T>*>(vertices_.data()), params.points = points_.data();
     params.kdops = kdops_.data();
   }
-  // Of one world they are the frame's.
+  // A single world uses the frame's counters.
   template <class T>
   void fill_counters(LaunchParams<T>& params, Counters* counters) const {
     params.counters = counters;
     params.worlds = worlds_.size() ? worlds_.data() : &counters->world;
   }
 
-  // Counters of worlds as before anything is found.
+  // Resets the counters of the worlds.
   void forget(cudaStream_t stream) const {
     if (worlds_.size()) check(cudaMemsetAsync(worlds_.data(), 0, worlds_.bytes(), stream), "cudaMemsetAsync");
   }
-  // How far the positions reach that the frame names; clears its counters.
+  // Computes the extent of the frame's positions; clears its counters.
   template <class T>
   void begin(const LaunchParams<T>& params, int multiprocessors, cudaStream_t stream) const {
     check(cudaMemsetAsync(params.counters, 0, sizeof(Counters), stream), "cudaMemsetAsync");
@@ -45,7 +45,7 @@ class DeviceMotion {
     extent_kernel<<<params.n_worlds * std::min(blocks_for(params.n_vertices, 256), most), 256, 0, stream>>>(params);
     check_launch("extent_kernel");
   }
-  // Then the motion itself.
+  // Then computes the motion itself.
   template <class T>
   void launch(Query query, const LaunchParams<T>& params, cudaStream_t stream) const {
     if (params.fast) {
@@ -62,10 +62,10 @@ class DeviceMotion {
   std::size_t bytes() const { return points_.bytes() + vertices_.bytes() + kdops_.bytes() + worlds_.bytes(); }
 
  private:
-  DeviceBuffer<GivenEnds<double>> vertices_;  // room for floats, too
+  DeviceBuffer<GivenEnds<double>> vertices_;  // large enough for floats as well
   DeviceBuffer<DevicePoint> points_;
   DeviceBuffer<VertexKdop> kdops_;
-  DeviceBuffer<WorldCounters> worlds_;  // of several worlds
+  DeviceBuffer<WorldCounters> worlds_;  // for several worlds
 };
 
 }  // namespace hpccd::gpu

@@ -20,7 +20,7 @@ __global__ void take_list_kernel(LaunchParams<T> params, u32 kind, const uint2* 
   if (first + threadIdx.x == 0) params.counters->survivors[kind] = params.counters->candidates[kind] = n;
 }
 
-// snapshot: of the list; null where there is none.
+// snapshot: of the list; null without a list.
 template <class T>
 __global__ void travel_kernel(LaunchParams<T> params, const double* snapshot) {
   double way = 0, away = 0;
@@ -43,12 +43,12 @@ template <class T>
 __global__ void snapshot_kernel(LaunchParams<T> params, double* snapshot) {
   const u32 i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= params.n_vertices) return;
-  const Vec3<double> start = load_ends(params.vertices, i).t0;  // what the caller gave may change
+  const Vec3<double> start = load_ends(params.vertices, i).t0;  // the caller's array may change
   double* to = snapshot + 3 * static_cast<u64>(i);
   to[0] = start.x, to[1] = start.y, to[2] = start.z;
 }
 
-// All that a frame found, and all that it left to the host.
+// All results of a frame, and all pairs that it left to the host.
 template <class T>
 __global__ void collect_kernel(LaunchParams<T> params, u64 n_found, u64 n_to_host, PairList vf, PairList ee) {
   const u64 n = n_found + n_to_host, stride = static_cast<u64>(gridDim.x) * blockDim.x;
@@ -68,7 +68,7 @@ class DeviceNearList {
   u64 most() const { return std::max(n_[0], n_[1]); }
   bool has_snapshot() const { return has_snapshot_; }
 
-  // In place of what a traversal finds.
+  // Takes the place of a traversal.
   template <class T>
   void take(const LaunchParams<T>& params, cudaStream_t stream) const {
     for (u32 k = 0; k < 2; ++k) {
@@ -83,11 +83,11 @@ class DeviceNearList {
     check_launch("travel_kernel");
   }
 
-  // From the last frame, whose counters are `c`, and whose start becomes the snapshot. Waits for the stream.
+  // Takes the list from the last frame, whose counters are `c`; its start becomes the snapshot. Waits for the stream.
   template <class T>
   void collect(const LaunchParams<T>& params, const Counters& c, cudaStream_t stream) {
     const u64 n = c.found_all + c.to_host;
-    n_[0] = n_[1] = 0;  // no list, should this fail
+    n_[0] = n_[1] = 0;  // no list, if this fails
     for (auto& pairs : pairs_) pairs.reserve(static_cast<std::size_t>(n + n / 4 + 1));
     const PairList lists[2] = {{pairs_[0].data(), pairs_[0].size()}, {pairs_[1].data(), pairs_[1].size()}};
     check(cudaMemsetAsync(&params.counters->listed, 0, sizeof params.counters->listed, stream), "cudaMemsetAsync");
@@ -101,7 +101,7 @@ class DeviceNearList {
     check(cudaStreamSynchronize(stream), "cudaStreamSynchronize");
     for (int k = 0; k < 2; ++k) n_[k] = listed[k];
   }
-  // The last frame's start, alone, becomes the snapshot. Does not wait for the stream.
+  // Makes the last frame's start the snapshot, without a list. Does not wait for the stream.
   template <class T>
   void begin_at(const LaunchParams<T>& params, cudaStream_t stream) {
     n_[0] = n_[1] = 0, has_snapshot_ = false;

@@ -13,9 +13,9 @@ namespace hpccd::gpu {
 
 class DevicePlaces {
  public:
-  // Of the rows of a result; to: where there is room for all. Comes back with those that only integers can tell, whose
-  // places are not written; or with nothing where they are so many that the host had better compute all of them. Waits
-  // for the stream.
+  // Computes outputs for the rows of a result; `to` must be large enough. Returns the rows that only integers can
+  // decide, which are not written; or nothing if they are so many that the host should compute all rows. Waits for the
+  // stream.
   template <class T>
   std::optional<std::vector<OpenRow>> find(const LaunchParams<T>& params, const FrameResult& r, const PlacesOut& to,
                                            const Stages& stages) {
@@ -48,7 +48,7 @@ class DevicePlaces {
     return open;
   }
 
-  // What the host has found of the rows that came back last.
+  // Writes the host's results for the rows that were returned last.
   void put(const PlacesOut& to, const std::vector<PairPlaces>& places, const Stages& stages) {
     if (places.empty()) return;
     places_.reserve(places.size());
@@ -62,7 +62,7 @@ class DevicePlaces {
   std::size_t bytes() const { return open_.bytes() + to_host_.bytes() + n_open_.bytes() + places_.bytes(); }
 
  private:
-  static constexpr u64 most_open = 8;  // of so many rows one, at most
+  static constexpr u64 most_open = 8;  // at most one of this many rows
 
   template <class X>
   static void fetch(X* to, const X* from, u64 n, cudaStream_t stream) {

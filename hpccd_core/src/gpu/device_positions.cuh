@@ -17,16 +17,16 @@ class DevicePositions {
  public:
   explicit DevicePositions(int device) : device_(device) {}
 
-  // Both ends on the device, as arrays that the stream's later work may read. By way of page-locked memory: the
-  // driver's own way from pageable memory takes one thread 100 us a megabyte. Waking the pool costs as much as copying
-  // half a megabyte. Those on another device are copied from there, those on this one are used where they are.
+  // Both ends on the device, as arrays for the stream's later work. Copies through page-locked memory: the driver's own
+  // copy from pageable memory takes 100 us per megabyte on one thread. Waking the pool costs as much as copying half a
+  // megabyte. Positions on another device are copied from there; those on this device are used in place.
   template <class T>
   void bring(Positions t0, Positions t1, const T* given[2], ThreadPool& pool, cudaStream_t stream) {
     const Positions ends[2] = {t0, t1};
     const std::size_t bytes = 3 * t0.n * sizeof(T), words = std::max<std::size_t>((bytes + 7) / 8, 1);
     char* to[2] = {nullptr, nullptr};
     for (int i = 0; i < 2; ++i) {
-      if (i == 1 && ends[1].data == ends[0].data) {  // of one snapshot
+      if (i == 1 && ends[1].data == ends[0].data) {  // for one snapshot
         given[1] = given[0];
         break;
       }
@@ -56,8 +56,8 @@ class DevicePositions {
         check(cudaMemcpyAsync(given_[i].data(), to[i], bytes, cudaMemcpyHostToDevice, stream), "cudaMemcpyAsync");
   }
 
-  // Later work of the stream waits for what the caller's has been given so far. Without one all work on the device has
-  // ended when this returns. Throws InvalidArgument where it is no stream of this device.
+  // Makes later work of the stream wait for the work enqueued on the caller's stream so far. Without a stream, waits
+  // for all work on the device. Throws InvalidArgument if it is not a stream of this device.
   void wait_for(std::optional<void*> callers, cudaStream_t stream) {
     if (!callers) {
       check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");

@@ -59,7 +59,7 @@ class DeviceScene {
     any_separation_ = separations_.any(), one_separation_ = separations_.uniform();
     separation_ = any_separation_ && one_separation_ ? separations_.first() : 0;
     if (!separations_.any() || separations_.version() == uploaded_) return;
-    uploaded_ = 0;  // none, should this fail
+    uploaded_ = 0;  // invalid, if this fails
     if (!one_separation_) {
       const std::vector<double> all = of_all_pairs<double>([&](u32 a, u32 b) { return separations_.of(a, b); });
       upload(pair_separation_, all.data(), all.size());
@@ -67,7 +67,7 @@ class DeviceScene {
     upload(largest_separation_, separations_.largest().data(), separations_.largest().size());
     uploaded_ = separations_.version();
   }
-  // For frames of that query.
+  // For frames of this query.
   template <class T>
   void fill_separations(LaunchParams<T>& params) const {
     const bool any = query_now() == Query::separations;
@@ -75,7 +75,7 @@ class DeviceScene {
     params.separations = any && !one_separation_ ? pair_separation_.data() : nullptr;
     params.largest_separation = any ? largest_separation_.data() : nullptr;
   }
-  // Changes with all that fill_separations names.
+  // Changes with every value that fill_separations writes.
   u64 separations_version() const { return separations_.version(); }
 
   const PairKeys& keys() const { return keys_; }
@@ -85,7 +85,7 @@ class DeviceScene {
   }
 
  private:
-  // Devices look pairs up in a table of all pairs, unless all are the same.
+  // Devices look up pairs in a table of all pairs, unless all values are the same.
   template <class V, class OfPair>
   std::vector<V> of_all_pairs(OfPair&& of_pair) const {
     std::vector<V> all(std::size_t{n_meshes_} * n_meshes_);
@@ -133,8 +133,8 @@ class DeviceScene {
   const Features& features_;
   const SeparationTable& separations_;
   const u32 n_worlds_;
-  std::uint64_t uploaded_ = 0;  // version of the separations there
-  // As of the last update: a detection prepared before a later change keeps using these.
+  std::uint64_t uploaded_ = 0;  // version of the separations on the device
+  // At the last update: a prepared detection keeps these values after a later change.
   bool any_separation_ = false, one_separation_ = true;
   double separation_ = 0;
   DeviceBuffer<uint2> edges_;

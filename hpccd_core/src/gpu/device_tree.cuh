@@ -15,9 +15,9 @@ class DeviceTree {
  public:
   explicit DeviceTree(u32 n_worlds) : n_worlds_(n_worlds), leaves_(n_worlds) {}
 
-  // Throws Error where it is deeper than the device's traversal goes.
+  // Throws Error if the tree is too deep for the device's traversal.
   void set(const Features& features, const Tree& tree) {
-    n_ = 0;  // no tree, should anything below fail
+    n_ = 0;  // no tree, if anything below fails
     const std::size_t n = tree.nodes.size();
     std::vector<u32> parent(n, 0), mesh(n), depth(n, 0);
     std::vector<uint2> links(n);

@@ -7,7 +7,7 @@
 
 namespace hpccd::gpu {
 
-// Copies what is there when all work on its device has ended. Throws Error.
+// Copies after all work on the device has ended. Throws Error.
 void download(const void* on_device, void* to, std::size_t bytes);
 
 }  // namespace hpccd::gpu

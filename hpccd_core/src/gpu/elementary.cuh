@@ -12,7 +12,7 @@
 
 namespace hpccd::gpu {
 
-// Which of the root tests a pair needs, if any.
+// The root tests that a pair needs, if any.
 struct RootTests {
   bool one, many;
 };
@@ -38,11 +38,11 @@ __device__ __forceinline__ void append_to_root_tests(const LaunchParams<T>& para
   append_pair(params.many[k], &params.counters->many[k], wanted.many, pair);
 }
 
-// The answer of the tier's fallback where double precision or twice that is enough; else it stays open.
+// The decision of the tier's fallback, if double precision or 106 bits suffice; otherwise the pair stays undecided.
 struct FallbackAnswer {
   bool contact, open;
   double toc;
-  bool tolerant = false;  // within a tolerance, where the tier promises no more
+  bool tolerant = false;  // within a tolerance, for tiers without a promise
 };
 
 template <Kind kind>
@@ -66,13 +66,14 @@ __device__ FallbackAnswer fallback(const LaunchParams<T>& params, uint4 v, doubl
   return decide_on_device<kind>(q, accuracy_of(params, v), separation);
 }
 
-// What the error bounds left open. A kernel of its own where some pairs have a separation: the others' would be slower
-// for its registers.
+// Pairs that the error bounds left undecided. A separate kernel for separations, whose registers would slow down the
+// other pairs.
 template <bool separations, class T>
 __global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ LaunchParams<T> params) {
   Counters& c = *params.counters;
   const u64 n = length(c.undecided, params.undecided_capacity), n_warps = gridDim.x;
-  // A warp goes the ways of all its pairs: few are spread over many warps. Of many, neighbours go similar ways.
+  // A warp executes the branches of all its pairs: few pairs are spread over many warps. With many pairs, neighbours
+  // take similar branches.
   const bool few = n <= 8 * n_warps;
   for (u64 begin = 0; begin < n; begin += 32 * n_warps) {
     const u64 i = begin + (few ? lane_number() * n_warps + blockIdx.x : u64{blockIdx.x} * 32 + lane_number());
@@ -93,7 +94,7 @@ __global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ La
     count_lanes(c.by_tolerance, answer.tolerant, pair.kind);
     count_lanes(c.by_extended, i < n && !answer.open && !answer.tolerant, pair.kind);
     if (params.time_only) keep_soonest(&c.soonest, answer.contact ? answer.toc : INFINITY);
-    // The device's integers know of contacts only.
+    // The device's integers support contacts only.
     const bool here = params.integers_on_device && !(separations && separation > 0);
     append_key(params.open_in_integers[0], params.open_capacity, &c.open_in_integers[0], answer.open && here, key);
     append_key(params.to_host, params.to_host_capacity, &c.to_host, answer.open && !here, key);

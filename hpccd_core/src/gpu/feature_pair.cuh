@@ -7,7 +7,7 @@
 
 namespace hpccd::gpu {
 
-// One vertex at both ends, widened.
+// One vertex at both ends, as doubles.
 struct Ends {
   Vec3<double> t0, t1;
 };
@@ -23,7 +23,7 @@ __device__ inline Ends load_ends(const GivenEnds<double>* vertices, u32 v) {
   return {{a.x, a.y, b.x}, {c.x, c.y, d.x}};
 }
 
-// v as pair_vertices gives them.
+// v: from pair_vertices.
 template <Kind kind, class T>
 __device__ inline Motion<double> load_motion(const GivenEnds<T>* vertices, uint4 v) {
   const Ends q0 = load_ends(vertices, v.x), q1 = load_ends(vertices, v.y), q2 = load_ends(vertices, v.z),
@@ -32,7 +32,7 @@ __device__ inline Motion<double> load_motion(const GivenEnds<T>* vertices, uint4
   return motion_of<kind>(t0, t1);
 }
 
-// One vertex at both ends, as floats in the coordinates of the boxes: what the CPU keeps as RoundedMotion.
+// One vertex at both ends, as floats in the coordinates of the boxes: the CPU's RoundedMotion.
 struct RoundedEnds {
   Vec3<float> t0, t1;
 };
@@ -57,11 +57,11 @@ struct VertexNumbers {
   __device__ u32 operator[](int i) const { return v[i]; }
 };
 
-// Of a pair, numbered through all worlds.
+// The vertices of a pair, numbered through all worlds.
 template <Kind kind, class T>
 __device__ inline uint4 vertices_of(const LaunchParams<T>& params, u32 first, u32 second) {
   const u32 world = world_of(params, kind, first), base = world * params.n_vertices;
-  // Through the cache for what no kernel writes.
+  // Through the read-only cache, since no kernel writes this data.
   const auto edge = [&](u32 e) {
     const uint2 v = __ldg(params.edges + e);
     return VertexNumbers{{v.x + base, v.y + base}};
@@ -93,14 +93,14 @@ __device__ inline Accuracy reported_as(const LaunchParams<T>& params, uint4 v) {
   return params.time_only && accuracy == Accuracy::exact ? Accuracy::conservative : accuracy;
 }
 
-// Of two features by one vertex of each.
+// The separation of two features, by one vertex of each.
 template <class T>
 __device__ inline double separation_of(const LaunchParams<T>& params, u32 first, u32 second) {
   if (!params.separations) return params.separation;
   return params.separations[mesh_of(params, first) * params.n_meshes + mesh_of(params, second)];
 }
 
-// Both ends of a pair, for the tests that need more than its spanning vectors: in the order of pair_vertices.
+// Both ends of a pair, in the order of pair_vertices, for tests that need more than its spanning vectors.
 struct PairEnds {
   Vec3<double> t0[4], t1[4];
 };

@@ -7,7 +7,7 @@ namespace {
 
 template <Query query, class T>
 void launch(const LaunchParams<T>& params, const Stages& stages) {
-  constexpr unsigned threads = 32;  // the fallback of some takes most of the registers
+  constexpr unsigned threads = 32;  // the fallback of some pairs needs most of the registers
   constexpr auto blocks = static_cast<unsigned>(Hints::most / threads);
   hints_kernel<query, T><<<dim3(blocks, 2), threads, 0, stages.stream>>>(params);
   check_launch("hints_kernel");

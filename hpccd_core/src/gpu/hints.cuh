@@ -10,7 +10,7 @@
 
 namespace hpccd::gpu {
 
-// Before the vertices are where load_motion looks.
+// Used before the vertices are in the arrays that load_motion reads.
 template <class T>
 __device__ PairEnds given_ends(const LaunchParams<T>& params, uint4 v) {
   const u32 vertex[4] = {v.x, v.y, v.z, v.w};
@@ -23,7 +23,7 @@ __device__ PairEnds given_ends(const LaunchParams<T>& params, uint4 v) {
   return q;
 }
 
-// Infinity where it is not known on the device that they touch.
+// Infinity if the device cannot decide that they touch.
 template <Query query, Kind kind, class T>
 __device__ double time_of(const LaunchParams<T>& params, uint2 pair) {
   const uint4 v = vertices_of<kind>(params, pair.x, pair.y);
@@ -47,7 +47,7 @@ __device__ double time_of(const LaunchParams<T>& params, uint2 pair) {
   return answer.contact ? answer.toc : INFINITY;
 }
 
-// One row of blocks a kind: both at once.
+// One row of blocks per kind, so that both run concurrently.
 template <Query query, class T>
 __global__ __launch_bounds__(32) void hints_kernel(const __grid_constant__ LaunchParams<T> params) {
   const u32 k = blockIdx.y;
@@ -55,13 +55,13 @@ __global__ __launch_bounds__(32) void hints_kernel(const __grid_constant__ Launc
     const double time = !valid   ? INFINITY
                         : k == 0 ? time_of<query, Kind::vertex_face>(params, pair)
                                  : time_of<query, Kind::edge_edge>(params, pair);
-    // Lane by lane: a warp may come out of this in parts (item_of_thread.cuh).
+    // Each lane separately: a warp may have diverged here (item_of_thread.cuh).
     if (time < INFINITY) atomicMax(&params.counters->soonest, ~bits_of(time));
   });
 }
 
-// Which pairs of what was found are the next hints: as many as there is room for of those that touch first and soon
-// after, as a motion may take the first ones apart.
+// Selects the hints for the next frame among the contacts: as many as fit of those that touch first or soon after,
+// since a motion may separate the first ones.
 template <class T>
 __global__ void choose_hints_kernel(LaunchParams<T> params) {
   const u64 n = length(params.counters->found_all, params.found_capacity),
@@ -88,11 +88,11 @@ class Hints {
     forget(stream);
   }
 
-  // Of the last frame, with `best` its earliest time, and `proven` that by the error bounds alone: its contacts that
-  // count. Does not wait for the stream.
+  // The contacts of the last frame that qualify; `best` is its earliest time, `proven` the earliest that error bounds
+  // alone have proven. Does not wait for the stream.
   template <class T>
   void choose(const LaunchParams<T>& params, double proven, u64 n_found, cudaStream_t stream) {
-    if (n_found == 0) return;  // where all was over before it was searched, too: they have shown to be good ones
+    if (n_found == 0) return;  // also if the frame ended before a search: the hints have proven useful
     decided_ = proven > params.best + (params.best > 0 ? soon : 0);
     forget(stream);
     choose_hints_kernel<<<std::min(blocks_for(n_found, 256), 256u), 256, 0, stream>>>(params);
@@ -107,8 +107,9 @@ class Hints {
 
   DeviceBuffer<uint2> pairs_[2];  // by kind
   DeviceBuffer<u64> n_;
-  // The error bounds alone would have given the last frame no such bound, or only a fallback knows that features touch
-  // from the beginning, where nothing else need be known. Else it is not worth 0.1 ms to decide what they leave open.
+  // Whether the fallback must decide hints: error bounds alone would not have given the last frame its bound, or only a
+  // fallback can decide that features touch at the start, which would end the search. Otherwise deciding what they
+  // leave open is not worth 0.1 ms.
   bool decided_ = false;
 };
 

@@ -23,11 +23,11 @@ __device__ exact::Answer decide_in_integers(Kind kind, const PairEnds& q) {
   return exact::earliest(given.query<Z>(kind));
 }
 
-// An answer as one number: the time of a contact, or one of these. Anything else is taken for an open pair, as is what
-// stands wherever an answer is awaited: put there with the memory (test_lists.cuh), and by who collects answers, which
-// costs less than a memset in each frame.
+// A result as one number: the time of a contact, or one of these. Any other value means an undecided pair. Memory is
+// initialised with such a value when it is allocated (test_lists.cuh), and by the kernel that collects results, which
+// is cheaper than a memset per frame.
 inline constexpr double no_contact = 2, stays_open = 3;
-__device__ inline double awaited() { return __longlong_as_double(-1); }  // not a number
+__device__ inline double awaited() { return __longlong_as_double(-1); }  // NaN
 
 template <int limbs, class T>
 __global__ __launch_bounds__(128) void integers_kernel(const __grid_constant__ LaunchParams<T> params,
@@ -50,7 +50,7 @@ __global__ __launch_bounds__(128) void collect_answers_kernel(const __grid_const
     const bool valid = i < n;
     const u64 key = valid ? params.open_in_integers[limbs - 1][i] : 0;
     const double answer = valid ? params.answers[i] : no_contact;
-    if (valid) params.answers[i] = awaited();  // by the next that asks
+    if (valid) params.answers[i] = awaited();  // read by the next stage
     const bool contact = answer <= 1, open = !contact && answer != no_contact;
     const Candidate pair = params.keys.pair_of(key);
     append_found(params, pair.kind, contact, {pair.first, pair.second}, answer);

@@ -10,8 +10,8 @@
 
 namespace hpccd::gpu {
 
-// Which of n items is the thread's, if below n. Few are spread over so many warps, as a warp goes the ways of all its
-// items; of many, neighbours go similar ways.
+// The thread's item, if below n. Few items are spread over many warps, since a warp executes the branches of all its
+// items; with many, neighbours take similar branches.
 __device__ inline u64 item_of_thread(u64 n, u32 resident_warps) {
   const u64 warp = (static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x) / 32;
   if (n > u64{8} * resident_warps) return warp * 32 + lane_number();

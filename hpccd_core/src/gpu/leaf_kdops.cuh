@@ -8,7 +8,7 @@
 
 namespace hpccd::gpu {
 
-// One warp a leaf, one half of it every other corner, one lane a direction at one end.
+// One warp per leaf; each half takes every other corner, one lane per direction and end.
 template <class T>
 __global__ __launch_bounds__(128) void leaf_kdops_kernel(const __grid_constant__ LaunchParams<T> params) {
   constexpr u32 n = 2 * n_kdop_directions;
@@ -40,8 +40,8 @@ void launch_leaf_kdops(const LaunchParams<T>& params, cudaStream_t stream) {
   check_launch("leaf_kdops_kernel");
 }
 
-// Both numbered through all worlds. By a whole warp: the first half looks whether the first leaf is below, the other
-// whether it is above.
+// Both numbered through all worlds. By a whole warp: one half tests whether the first leaf is below, the other whether
+// it is above.
 template <class T>
 __device__ __forceinline__ bool leaf_kdops_apart(const LaunchParams<T>& params, uint2 leaves) {
   constexpr u32 n = 2 * n_kdop_directions;

@@ -10,7 +10,7 @@
 
 namespace hpccd::gpu {
 
-// What kdop_filter.inl says of a pair.
+// The k-DOP test of a pair (kdop_filter.inl).
 template <Kind kind>
 __device__ __forceinline__ bool kdops_apart(const VertexKdop* kdops, uint4 v) {
   const VertexKdop of[4] = {kdops[v.x], kdops[v.y], kdops[v.z], kdops[v.w]};
@@ -20,9 +20,8 @@ __device__ __forceinline__ bool kdops_apart(const VertexKdop* kdops, uint4 v) {
   return apart;
 }
 
-// What is found to touch must not be what k-DOPs say is apart: the CPU asks them first, of all pairs; here they cost
-// more than the other filters, and come last. What is left open takes the place of the survivors, which nobody reads
-// any more.
+// Contacts must pass the k-DOP filter: the CPU applies it first, to all pairs; here it is more expensive than the other
+// filters and comes last. Undecided pairs overwrite the survivors, which are no longer needed.
 template <Kind kind, bool single, class T>
 __device__ __forceinline__ void seek_likely_roots(const LaunchParams<T>& params) {
   constexpr u32 k = kind == Kind::edge_edge;

@@ -29,7 +29,7 @@ class Buffer {
   Buffer(const Buffer&) = delete;
   Buffer& operator=(const Buffer&) = delete;
 
-  // Room for n; what was inside is lost where it grows.
+  // Allocates memory for n elements; the contents are lost when it grows.
   void reserve(std::size_t n) {
     if (n <= size_) return;
     release();

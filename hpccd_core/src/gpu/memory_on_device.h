@@ -9,11 +9,11 @@ namespace hpccd::gpu {
 
 class MemoryOnDevice {
  public:
-  // Throws Error where there is no device.
+  // Throws Error without a device.
   static std::unique_ptr<MemoryOnDevice> create();
   virtual ~MemoryOnDevice() = default;
-  // Copies what is there; whoever wrote it has ended, as after a query of these positions. Other work on the device is
-  // not waited for. Throws Error.
+  // Copies device memory whose writer has ended, as after a query of these positions. Does not wait for other work on
+  // the device. Throws Error.
   virtual void assign(const void* on_device, std::size_t bytes) = 0;
   virtual const void* data() const = 0;
 };

@@ -17,9 +17,9 @@ struct NearProduct {
   __device__ static NearProduct of(u32 first, u32 n_first, u32 second, u32 n_second) {
     return {first, second, n_first * n_second, n_second, magic_of(n_second)};
   }
-  // i / n for i < 576 and n <= 24 is i magic / 65536 where magic is 65536 / n, or above it by less than 2: that adds
-  // less than 1 / 48. A quotient off by two ulp, 1 / 64 n at most, is enough: what 65536 / n has behind the point is
-  // none or at least 1 / n.
+  // i / n for i < 576 and n <= 24 is i magic / 65536 if magic exceeds 65536 / n by less than 2: that adds less than 1 /
+  // 48. A quotient with an error of two ulp, at most 1 / 64 n, suffices: the fractional part of 65536 / n is zero or at
+  // least 1 / n.
   __device__ static u32 magic_of(u32 n) {
     return static_cast<u32>(__fdividef(65536.0f, static_cast<float>(n ? n : 1))) + 1;
   }
@@ -29,8 +29,8 @@ struct NearProduct {
   }
 };
 
-// Each two of n edges once: of n (or n + 1) numbers row r has those of r with all behind it, and those of the r-th from
-// the end, width numbers together.
+// Each two of n edges once, in rows of equal width: row r of n (or n + 1) numbers combines edge r with all later ones
+// and the r-th edge from the end with those after it.
 __device__ inline NearProduct edges_of_one_leaf(u32 n) {
   const u32 width = n < 2 ? 1 : (n - 1) | 1;
   return {0, 0, n < 2 ? 0 : width * ((width + 1) / 2), width, NearProduct::magic_of(width)};
@@ -39,7 +39,7 @@ __device__ inline uint2 two_of_one_leaf(uint2 c, u32 width) {
   return c.y < c.x ? uint2{width - c.x, width - c.y} : uint2{c.x, c.y + 1};
 }
 
-// Candidates that wait in shared memory for a place in the lists, and how many there were.
+// Candidates that wait in shared memory for a place in the lists, and their total number.
 struct NearState {
   u32 n = 0, tested[2] = {0, 0};
 };
@@ -72,12 +72,12 @@ __device__ __forceinline__ void flush_candidates(const LaunchParams<T>& params, 
   __syncwarp();
 }
 
-// first, second: where two features are, of different leaves or of one.
+// first, second: positions of two features, of different leaves or of one.
 __device__ __forceinline__ bool is_near(const NearLeaves& s, u32 first, u32 second, u32 first_edge, bool edges,
                                         bool face_first, uint2& features) {
   const FeatureNumbers a = s.first.numbers_of(first), b = s.second.numbers_of(second);
   const u32 *v = a.vertex, *w = b.vertex;
-  // Of two edges third vertices are second ones, of a vertex all are the same.
+  // For edges the third vertex repeats the second one; for a vertex all are the same.
   const bool apart = v[0] != w[0] && v[0] != w[1] && v[1] != w[0] && v[1] != w[1] && v[0] != w[2] && v[2] != w[0];
   const bool swapped = edges ? a.number > b.number : face_first;
   features = {(swapped ? b.number : a.number) + (edges ? first_edge : 0),
@@ -112,7 +112,7 @@ __device__ __forceinline__ void keep_near_pairs(const LaunchParams<T>& params, N
   }
 }
 
-// The first leaf of the pairs at work, which is staged. Numbered through all worlds.
+// The first leaf of the current pairs, which is staged. Numbered through all worlds.
 struct FirstLeaf {
   u32 number = 0xFFFFFFFFu, world = 0;
   DeviceLeaf leaf{};
@@ -133,7 +133,7 @@ __device__ __forceinline__ void stage_first(const LaunchParams<T>& params, NearL
   __syncwarp();
 }
 
-// Which features of the first leaf overlap the other.
+// The features of the first leaf that overlap the other leaf.
 template <class T>
 __device__ __forceinline__ NearCounts near_of_first(const LaunchParams<T>& params, NearLeaves& s,
                                                     const DeviceLeaf& first, u32 other, u32 tested) {
@@ -157,7 +157,7 @@ __device__ __forceinline__ void near_candidates(const LaunchParams<T>& params, N
                                                 const FirstLeaf& first, u32 second, const DeviceLeaf& second_leaf) {
   const u32 y = first.world * params.n_leaves + second, tested = tested_features(params, first.leaf, second_leaf);
   const LeafOrder order(second_leaf);
-  // Before it is known whether they are needed: the wait for the other leaf's box is one for these, too.
+  // Loaded before it is known whether they are needed, so that this wait coincides with that for the other leaf's box.
   const u32 corner = lane_corner(params, second_leaf, first.world);
   LeafFeature feature{0, 0};
   if (lane_number() < order.n) feature = feature_at(params, second_leaf, lane_number());

@@ -7,7 +7,7 @@
 
 namespace hpccd::gpu {
 
-// Where a vertex is along the axes and the slanted directions.
+// Coordinates of a vertex along the axes and the slanted directions.
 struct SnapshotPoint {
   float x[6];
 };
@@ -16,8 +16,8 @@ __device__ inline SnapshotPoint snapshot_point(const Bound& axes, const Bound& s
   return {{axes.x[0], axes.x[1], axes.x[2], slanted.x[0], slanted.x[1], slanted.x[2]}};
 }
 
-// By how much boxes grow along both: in a snapshot as much for all vertices of a world, so that what bounds them may
-// grow in their place (rounding keeps the order of numbers).
+// The amounts by which boxes grow along both: in a snapshot the same for all vertices of a world, so that the bounds
+// may grow instead (rounding keeps the order of numbers).
 struct SnapshotReach {
   float axes, slanted;
 };
@@ -57,12 +57,12 @@ __device__ inline bool overlap(const SnapshotBox& a, const SnapshotBox& b) {
   return !apart;
 }
 
-// Of an edge the second vertex comes twice, a vertex thrice.
+// An edge repeats its second vertex, a vertex is repeated three times.
 struct FeatureNumbers {
   u32 vertex[3], number;
 };
 
-// All features of a leaf in one order: edges, faces, vertices. Most leaves have fewer than a warp has lanes.
+// All features of a leaf in one order: edges, faces, vertices. Most leaves have fewer features than a warp has lanes.
 struct LeafOrder {
   static constexpr u32 most = (3 + 1 + 3) * Tree::leaf_size, most_corners = 3 * Tree::leaf_size;
   u32 until_face, until_vertex, n;
@@ -73,7 +73,7 @@ struct LeafOrder {
   __device__ bool is_vertex(u32 i) const { return i >= until_vertex; }
 };
 
-// Its corners, and its number where it has another than its vertex.
+// The corners of a feature, and its number if it differs from its vertex.
 template <class T>
 __device__ __forceinline__ LeafFeature feature_at(const LaunchParams<T>& params, const DeviceLeaf& l, u32 i) {
   const LeafOrder order(l);
@@ -85,7 +85,7 @@ __device__ __forceinline__ LeafFeature feature_at(const LaunchParams<T>& params,
   return f;
 }
 
-// The words of a box lie apart, so that neighbouring lanes read neighbouring words.
+// The words of a box are stored separately, so that neighbouring lanes read neighbouring words.
 struct StagedFeatures {
   float4 bound[3][LeafOrder::most];
   uint4 numbers[LeafOrder::most];
@@ -106,7 +106,7 @@ struct StagedFeatures {
   }
 };
 
-// Corners of the leaf at work; tags: the vertices.
+// Corners of the current leaf; tags: the vertices.
 struct StagedCorners {
   Bound axes[LeafOrder::most_corners], slanted[LeafOrder::most_corners];
 
@@ -130,13 +130,13 @@ struct StagedCorners {
 };
 
 struct NearLeaves {
-  StagedFeatures first, second;         // all that the first leaf has; of the second one what overlaps the first
-  unsigned char near[LeafOrder::most];  // which features of the first leaf overlap the second
+  StagedFeatures first, second;  // all features of the first leaf; of the second one those that overlap the first
+  unsigned char near[LeafOrder::most];  // features of the first leaf that overlap the second
   StagedCorners corners;
   uint2 waiting[96];  // candidates
 };
 
-// The vertex of the lane's corner, where that is. Waits for nothing but the leaf.
+// The vertex of the lane's corner, and its position. Depends only on the leaf.
 template <class T>
 __device__ __forceinline__ u32 lane_corner(const LaunchParams<T>& params, const DeviceLeaf& l, u32 world) {
   if (lane_number() >= l.n_corners()) return 0;
@@ -160,12 +160,12 @@ __device__ __forceinline__ SnapshotReach stage_corners(const LaunchParams<T>& pa
   return {__shfl_sync(all_lanes, reach.axes, 0), __shfl_sync(all_lanes, reach.slanted, 0)};
 }
 
-// How many features of a leaf overlap the other; they stand one after the other in the leaf's order.
+// Numbers of a leaf's features that overlap the other leaf; they are stored consecutively in the leaf's order.
 struct NearCounts {
   u32 edges = 0, faces = 0, vertices = 0;
 
   __device__ u32 all() const { return edges + faces + vertices; }
-  // Counts the lanes' features, by their places in the order; where the lane's one stands. All lanes must call.
+  // Counts the lanes' features by their order; returns the position of the lane's feature. All lanes must call.
   __device__ u32 add(const LeafOrder& order, u32 i, bool near) {
     const u32 mask = __ballot_sync(all_lanes, near), at = all() + __popc(mask & ((1u << lane_number()) - 1));
     const u32 n_edges = __popc(__ballot_sync(all_lanes, near && order.is_edge(i))),

@@ -10,28 +10,28 @@
 
 namespace hpccd::gpu {
 
-// Where features have so many pairs that to look at all of a feature's takes too long, the host sorts keys instead.
+// If a feature has more pairs than this, comparing all of them takes too long, and the host sorts keys instead.
 inline constexpr u32 most_of_a_feature = 2048;
 
-// A pair on its way to its place.
+// A pair before it is placed.
 struct alignas(16) PlacedPair {
   u32 first, second;
   double toc;
 };
 
-// Of what the caller gets: places for so many rows.
+// The caller's arrays, with memory for this many rows.
 struct ResultPlaces {
   uint2* vf;
   uint4* ee;
   uint3* ef;
   double* toc;  // of the vertex-face pairs, then of the others
   u64 most_vf, most_ee, most_ef;
-  // Of several worlds: where the rows of each begin and those of the last end, and what is known of each world.
+  // For several worlds: offsets of the rows of each, and per-world results.
   u64 *vf_offsets, *ee_offsets, *hashes;
   double* first_tocs;
 };
 
-// f(i) for all that was found, of which there may be more than there is room for. All lanes come back together.
+// f(i) for all contacts, of which there may be more than memory for them. Lanes reconverge afterwards.
 template <class T, class Function>
 __device__ void for_found(const LaunchParams<T>& params, Function&& f) {
   const u64 n = length(params.counters->found_all, params.found_capacity),
@@ -45,7 +45,7 @@ __device__ WorldCounters& world_of(const LaunchParams<T>& params, const Candidat
   return params.worlds[world_of(params, pair.kind, pair.first)];
 }
 
-// Whether what was found is among the results.
+// Whether a contact is among the results.
 template <class T>
 __device__ bool is_wanted(const LaunchParams<T>& params, u64 i, const Candidate& pair) {
   if (params.wanted == Wanted::all) return true;
@@ -60,7 +60,7 @@ __global__ void firsts_kernel(const __grid_constant__ LaunchParams<T> params) {
   for_found(params, [&](u64 i) {
     const u64 key = params.found_keys[i];
     WorldCounters& world = world_of(params, params.keys.pair_of(key));
-    // Most come later than what others have found.
+    // Most contacts are later than those that others have found.
     if (params.wanted == Wanted::first) {
       if (~key > world.first_key) atomicMax(&world.first_key, ~key);
     } else if (const u64 toc = ~bits_of(params.found_tocs[i]); toc > world.first_toc) {
@@ -69,7 +69,7 @@ __global__ void firsts_kernel(const __grid_constant__ LaunchParams<T> params) {
   });
 }
 
-// Before the results are made once more.
+// Before the results are computed again.
 template <class T>
 __global__ void forget_results_kernel(const __grid_constant__ LaunchParams<T> params) {
   const u32 k = blockIdx.x * blockDim.x + threadIdx.x;
@@ -80,7 +80,7 @@ __global__ void forget_results_kernel(const __grid_constant__ LaunchParams<T> pa
   if (k < params.n_worlds) params.worlds[k].hash = params.worlds[k].first_toc = params.worlds[k].first_key = 0;
 }
 
-// Where the pairs were not counted as they were found.
+// For pairs that were not counted when they were found.
 template <class T>
 __global__ void count_kernel(const __grid_constant__ LaunchParams<T> params, u32* n_of_group) {
   for_found(params, [&](u64 i) {
@@ -90,7 +90,7 @@ __global__ void count_kernel(const __grid_constant__ LaunchParams<T> params, u32
   });
 }
 
-// first_of_group: how many pairs the groups before have.
+// first_of_group: number of pairs in previous groups.
 template <class T>
 __global__ void place_kernel(const __grid_constant__ LaunchParams<T> params, u32* n_of_group, const u32* first_of_group,
                              PlacedPair* placed) {
@@ -111,8 +111,8 @@ __global__ void place_kernel(const __grid_constant__ LaunchParams<T> params, u32
   if (lane_number() == 0 && most) atomicMax(&c.most_of_a_feature, u64{most});
 }
 
-// Writes rows as the caller sees them, with features numbered in their world, and adds up each world's hash. Lanes of a
-// warp that call together add up what is of one world together.
+// Writes rows in the caller's layout, with features numbered in their world, and adds up each world's hash. Lanes of a
+// warp that call together add up the values of one world together.
 template <class T>
 class RowWriter {
  public:
@@ -147,7 +147,7 @@ class RowWriter {
   }
 
  private:
-  // A thread's rows are in the order of worlds, or nearly: sums are kept until another world comes.
+  // A thread's rows are nearly in the order of worlds: sums are kept until the world changes.
   __device__ void add(u32 world, u64 hash, double toc) {
     if (world != world_) {
       give_up();
@@ -168,7 +168,7 @@ class RowWriter {
   double soonest_ = INFINITY;
 };
 
-// Whether there is room for all rows: else the host makes it, and asks again.
+// Whether there is memory for all rows: otherwise the host allocates it, and launches again.
 template <bool edges_and_faces>
 HPCCD_HD bool fit(const Counters& c, const ResultPlaces& to) {
   return edges_and_faces ? c.rows[0] + c.rows[1] <= to.most_ef : c.rows[0] <= to.most_vf && c.rows[1] <= to.most_ee;
@@ -196,8 +196,8 @@ __global__ void results_kernel(const __grid_constant__ LaunchParams<T> params, c
   rows.finish();
 }
 
-// Of several worlds: where the rows of each begin, what is known of each, and of all together. Where rows were not
-// written for want of room, hashes are zero still: launched again with the rows, it adds to nothing.
+// For several worlds: offsets, per-world results, and totals. If rows were not written for lack of memory, hashes are
+// still zero: launching again with the rows adds them once.
 template <bool edges_and_faces, class T>
 __global__ void worlds_kernel(const __grid_constant__ LaunchParams<T> params, const u32* first_of_group,
                               const __grid_constant__ ResultPlaces to) {
@@ -227,14 +227,14 @@ __global__ void worlds_kernel(const __grid_constant__ LaunchParams<T> params, co
   keep_soonest(&c.world.first_toc, soonest);
 }
 
-// Where there is nothing to look at.
+// For frames without rows.
 __global__ void no_rows_kernel(u32 n_worlds, const __grid_constant__ ResultPlaces to) {
   const u32 k = blockIdx.x * blockDim.x + threadIdx.x;
   if (k <= n_worlds) to.vf_offsets[k] = to.ee_offsets[k] = 0;
   if (k < n_worlds) to.hashes[k] = 0, to.first_tocs[k] = INFINITY;
 }
 
-// What is not wanted goes to the end, beyond the largest key.
+// Contacts that are not results go to the end, beyond the largest key.
 template <class T>
 __global__ void sortable_kernel(const __grid_constant__ LaunchParams<T> params, u64* keys, u32* numbers) {
   for_found(params, [&](u64 i) {
@@ -244,7 +244,7 @@ __global__ void sortable_kernel(const __grid_constant__ LaunchParams<T> params, 
   });
 }
 
-// The same from sorted keys, and from which of what was found each comes.
+// The same from sorted keys, and the index of the contact of each.
 template <bool edges_and_faces, class T>
 __global__ void sorted_results_kernel(const __grid_constant__ LaunchParams<T> params, const u64* keys, const u32* order,
                                       const __grid_constant__ ResultPlaces to) {

@@ -6,7 +6,7 @@
 
 namespace hpccd::gpu {
 
-// How many entries of a list are really there.
+// The number of stored entries of a list.
 __device__ inline u64 length(u64 counted, u64 capacity) { return counted < capacity ? counted : capacity; }
 
 // f(pair or nothing) for each pair of a list, whole warps at a time.
@@ -20,8 +20,8 @@ __device__ void for_pairs(const PairList& list, u64 counted, Function&& function
   }
 }
 
-// The same, with load(numbers(pair)), both asked for early: numbers while the pair before is at work, and what they
-// name where it calls its last argument. Where there is no pair, they are asked for the first features of all.
+// The same, with load(numbers(pair)), both prefetched: numbers while the previous pair is processed, and the data that
+// they refer to when f calls its last argument. Without a pair, the first features are loaded.
 template <class Numbers, class Load, class Function>
 __device__ __forceinline__ void for_pairs_loaded_ahead(const PairList& list, u64 counted, Numbers&& numbers,
                                                        Load&& load, Function&& function) {
@@ -63,14 +63,14 @@ __device__ inline void append_key(u64* keys, u64 capacity, u64* counter, bool wa
   if (wanted && at < capacity) keys[at] = key;
 }
 
-// Left to the fallback.
+// Leaves the pair to the fallback.
 template <class T>
 __device__ void append_undecided(const LaunchParams<T>& params, Kind kind, bool wanted, uint2 pair) {
   append_key(params.undecided, params.undecided_capacity, &params.counters->undecided, wanted,
              params.keys.key_of(kind, pair.x, pair.y));
 }
 
-// Left to the CPU.
+// Leaves the pair to the CPU.
 template <class T>
 __device__ void append_to_host(const LaunchParams<T>& params, Kind kind, bool wanted, uint2 pair) {
   append_key(params.to_host, params.to_host_capacity, &params.counters->to_host, wanted,
@@ -85,7 +85,7 @@ __device__ inline void count_lanes(u64 counters[2], bool counts, Kind kind) {
   }
 }
 
-// Adds what all lanes counted.
+// Adds the counts of all lanes.
 __device__ inline void add_up(u64* counter, u32 n) {
   for (int d = 16; d > 0; d /= 2) n += __shfl_xor_sync(all_lanes, n, d);
   if (lane_number() == 0 && n) atomicAdd(counter, static_cast<u64>(n));

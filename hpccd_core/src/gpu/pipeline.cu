@@ -107,16 +107,16 @@ class DevicePipeline : public Pipeline {
   std::map<std::string, double> stages() const override { return timer_.stages(); }
 
  private:
-  // Lists begin with room for so many times the scene's primitives that most scenes outgrow them once or never.
+  // Initial size of lists, as a multiple of the scene's primitives: most scenes outgrow it once or never.
   std::size_t typical_size() const {
     return std::max<std::size_t>(std::size_t{features_.n_primitives()} * options_.worlds, 1024);
   }
   void begin() {
     goal_ = Goal::results, best_.reset();
     check(cudaSetDevice(device_), "cudaSetDevice");
-    // Work of a frame that failed may still be under way on these buffers.
+    // Work of a failed frame may still be using these buffers.
     check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
-    host_counters_.data()->area = 0;  // of this frame it is not known yet, and never where it is refused
+    host_counters_.data()->area = 0;  // not yet known for this frame, and never if it is rejected
   }
   bool run_frame(Query query, Positions t0, Positions t1, double distance, ThreadPool& pool) {
     query_ = query;
@@ -171,9 +171,9 @@ class DevicePipeline : public Pipeline {
   PlacesOut places_out_{};
   DeviceBuffer<Counters> counters_;
   PinnedBuffer<Counters> host_counters_;
-  Counters last_counters_{};  // of the frame before the one that lists for those to come: what stats() tells
+  Counters last_counters_{};  // of the last frame that was not only for near lists: reported by stats()
 
-  // What a frame is for: contacts as the caller sees them, or less.
+  // The purpose of a frame: contacts for the caller, or less.
   enum class Goal : unsigned char { results, earliest, earliest_of_near, near_list };
   bool for_earliest() const { return goal_ == Goal::earliest || goal_ == Goal::earliest_of_near; }
 
@@ -182,13 +182,13 @@ class DevicePipeline : public Pipeline {
   std::size_t most_near_ = 0;
   bool gave_up_listing_ = false;
   bool given_doubles_ = true;             // in the last frame
-  u64 floats_suffice_ = options_.worlds;  // in so many worlds of the last frame that asked
+  u64 floats_suffice_ = options_.worlds;  // number of worlds for which floats sufficed in the last fast frame
   Goal goal_ = Goal::results;
   Best best_;
   Query query_ = Query::contacts;
   u64 passes_ = 0, exact_last_time_ = 0;
   std::vector<Candidate> undecided_;
-  // Of a prepared frame: the caller's positions.
+  // The caller's positions of a prepared frame.
   const void *prepared_t0_ = nullptr, *prepared_t1_ = nullptr;
   std::shared_ptr<DeviceBuffer<PreparedCounts>> prepared_counts_;
 };
@@ -198,7 +198,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   if (goal_ != Goal::near_list) undecided_.clear(), passes_ = 0;
   timer_.begin(stream_);
   if (goal_ == Goal::results) contacts_.begin();
-  // The caller's stream may still read these rows. To bring positions from the device waits for it too.
+  // The caller's stream may still read these rows. Copying positions from the device waits for it as well.
   if (goal_ == Goal::results && (tree_.empty() || (options_.results_on_device && !t0.on_device)))
     positions_.wait_for(t0.made_on, stream_);
   if (tree_.empty()) {
@@ -223,7 +223,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
     if (goal_ == Goal::results) launch_results(params);
     copy_counters();
     check(cudaEventRecord(counted_, stream_), "cudaEventRecord");
-    // Pairs for exact arithmetic came last time too: threads that sleep take longer to wake than these take.
+    // The last frame had pairs for exact arithmetic: sleeping threads take longer to wake than these take.
     if (exact_last_time_ > 1) pool.share([](int) {});
     check(cudaEventSynchronize(counted_), "cudaEventSynchronize");
     if (c.bad) return false;
@@ -356,7 +356,7 @@ PreparedResults DevicePipeline::prepare(Positions t0, Positions t1, double room)
   prepared_counts_ = std::make_shared<DeviceBuffer<PreparedCounts>>();
   prepared_counts_->reserve(1);
   const ResultPlaces to = contacts_.reserve_rows(roomy(c.rows[0]), roomy(c.rows[1]));
-  enqueue(stream_);  // what is loaded, or looked up, when it is first used cannot be captured
+  enqueue(stream_);  // lazy loading and lookups cannot be captured
   check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
   const FrameResult r = contacts_.result(query_, c);
   PreparedResults p;
@@ -389,7 +389,7 @@ void DevicePipeline::enqueue_frame() {
     contacts_.find_nothing(on_);
   } else {
     params = frame_params(0, static_cast<const T*>(prepared_t0_), static_cast<const T*>(prepared_t1_));
-    // In which worlds floats suffice only the device will know.
+    // Only the device will know for which worlds floats suffice.
     params.in_floats = params.fast, params.in_doubles = true;
     launch(params);
     launch_results(params);
@@ -472,20 +472,20 @@ void DevicePipeline::copy_counters() {
         "cudaMemcpyAsync");
 }
 
-// Before room is made for what is not wanted. Of the candidates of ordinary lists an eighth is near.
+// Checked before memory is allocated for unneeded lists. An eighth of the candidates of ordinary lists is near.
 bool DevicePipeline::lists_too_many() const {
   const Counters& c = *host_counters_.data();
   return goal_ == Goal::near_list && (c.found_all + c.to_host > most_near_ || c.leaf_pairs > 8 * most_near_ ||
                                       c.all_survivors[0] + c.all_survivors[1] > 32 * most_near_);
 }
 
-// Whether all that the frame tests may be tested in single precision first.
+// Whether all pairs of the frame may be tested in single precision first.
 bool DevicePipeline::is_fast() const {
   return query_ == Query::contacts && !best_ && goal_ != Goal::earliest_of_near && scene_.all_fast();
 }
 
-// Where floats suffice only the device knows, and the kernels are launched before it says so: as in the last frame.
-// True where the frame must run again.
+// Only the device knows where floats suffice, and kernels are launched before: assumes the last frame's result. True if
+// the frame must run again.
 template <class T>
 bool DevicePipeline::guessed_wrong(const LaunchParams<T>& params) {
   if (!params.fast) return false;
@@ -493,7 +493,7 @@ bool DevicePipeline::guessed_wrong(const LaunchParams<T>& params) {
   return (floats_suffice_ > 0 && !params.in_floats) || (floats_suffice_ < options_.worlds && !params.in_doubles);
 }
 
-// Makes room where a list was too short. True where the frame must run again.
+// Enlarges lists that were too short. True if the frame must run again.
 bool DevicePipeline::grow_overflowed() {
   const Counters& c = *host_counters_.data();
   bool again = lists_.grow(c, goal_ == Goal::earliest_of_near ? TestLists::From::near_list : TestLists::From::leaves);
@@ -507,7 +507,7 @@ bool DevicePipeline::grow_overflowed() {
 std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
   const Counters& c = goal_ == Goal::near_list ? last_counters_ : *host_counters_.data();
   std::map<std::string, std::uint64_t> s;
-  const bool edges_and_faces = query_ == Query::intersections;  // in the place of the first kind
+  const bool edges_and_faces = query_ == Query::intersections;  // in place of the first kind
   const char* kinds[2] = {edges_and_faces ? "ef" : "vf", "ee"};
   for (int k = 0; k < (edges_and_faces ? 1 : 2); ++k) {
     const std::string kind = kinds[k];

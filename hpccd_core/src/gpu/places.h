@@ -8,7 +8,7 @@
 
 namespace hpccd::gpu {
 
-// A row whose places only integers can tell. Words alone: what a struct's gaps hold nobody writes, and copies read it.
+// A row that only integers can decide. Words only: padding of a struct would be copied uninitialised.
 struct OpenRow {
   std::uint64_t row;  // vertex-face, then edge-edge
   double toc, separation;

@@ -7,7 +7,7 @@
 namespace hpccd::gpu {
 namespace {
 
-// In place of the number of a row whose places are written.
+// Replaces the number of a row that has been written.
 constexpr u64 written = ~u64{0};
 
 __global__ __launch_bounds__(128) void places_in_integers_kernel(const __grid_constant__ PlacesTask task,

@@ -7,7 +7,7 @@
 namespace hpccd::gpu {
 namespace {
 
-// The world whose rows, from offsets[world] on, hold this one.
+// The world of a row, by the offsets of the worlds.
 __device__ u32 world_of_row(const u64* offsets, u32 n_worlds, u64 row) {
   u32 low = 0, high = n_worlds;
   while (high - low > 1) {
@@ -46,7 +46,7 @@ __global__ __launch_bounds__(128) void places_kernel(const __grid_constant__ Lau
     row.row = i, row.toc = task.tocs[i], row.separation = separation_of(params, v.x, v.z);
     for (int k = 0; k < 4; ++k) row.t0[k] = q.t0[k], row.t1[k] = q.t1[k];
     if (find_places<LeftOpen>(task, row)) continue;
-    // Lane by lane: a warp may come out of this in parts (item_of_thread.cuh).
+    // Each lane separately: a warp may have diverged here (item_of_thread.cuh).
     const u64 at = atomicAdd(task.n_open, u64{1});
     if (at < task.open_capacity) task.open[at] = row;
   }

@@ -9,11 +9,11 @@
 
 namespace hpccd::gpu {
 
-// Where places go; what nobody asked for may be null.
+// Output arrays; those that are not requested may be null.
 struct PlacesOut {
   Outputs outputs;
-  double *points, *normals;  // three a row
-  double* closest;           // six a row
+  double *points, *normals;  // three per row
+  double* closest;           // six per row
 };
 
 struct PlacesTask {
@@ -21,10 +21,10 @@ struct PlacesTask {
   const uint2* vf;
   const uint4* ee;
   const double* tocs;                  // of the vertex-face pairs, then of the others
-  const u64 *vf_offsets, *ee_offsets;  // of several worlds
+  const u64 *vf_offsets, *ee_offsets;  // for several worlds
   PlacesOut out;
-  // Rows that only integers can tell; of these, the ones that integers of a fixed size cannot. Counted on where there
-  // is no more room.
+  // Rows that only integers can decide; and among these, rows that fixed-size integers cannot. Counters continue beyond
+  // the capacity.
   OpenRow *open, *to_host;
   u64 open_capacity;  // of both
   u64* n_open;        // of both
@@ -33,9 +33,9 @@ struct PlacesTask {
 // Defined for float and double.
 template <class T>
 void launch_places(const LaunchParams<T>& params, const PlacesTask& task, const Stages& stages);
-// Of the rows that those leave open.
+// For the rows that those leave open.
 void launch_places_in_integers(const PlacesTask& task, const Stages& stages);
-// places[i]: of the row open[i].
+// places[i] belongs to the row open[i].
 void launch_put(const PlacesOut& out, const OpenRow* open, const PairPlaces* places, u64 n, const Stages& stages);
 
 }  // namespace hpccd::gpu

@@ -7,12 +7,12 @@
 
 namespace hpccd::gpu {
 
-// How much each list of such a frame holds.
+// The sizes of the lists of such a frame.
 struct PreparedRoom {
   u64 leaf_pairs, survivors, single, many, separated, undecided, open, found;
 };
 
-// After all other work of the frame.
+// Runs after all other work of the frame.
 template <class T>
 __global__ void tell_kernel(const __grid_constant__ LaunchParams<T> params, const __grid_constant__ PreparedRoom room,
                             const __grid_constant__ ResultPlaces to, PreparedCounts* told) {
@@ -27,7 +27,7 @@ __global__ void tell_kernel(const __grid_constant__ LaunchParams<T> params, cons
                     (c.most_of_a_feature > most_of_a_feature ? PreparedCounts::too_many_of_one : 0);
   const bool good = state == PreparedCounts::complete;
   const u32 k = blockIdx.x * blockDim.x + threadIdx.x;
-  // Who trusts the offsets of worlds must find no rows either.
+  // A reader of the worlds' offsets must not find rows either.
   if (!good && params.n_worlds > 1 && k <= params.n_worlds) {
     to.vf_offsets[k] = to.ee_offsets[k] = 0;
     if (k < params.n_worlds) to.hashes[k] = 0, to.first_tocs[k] = INFINITY;

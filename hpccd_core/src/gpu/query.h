@@ -3,16 +3,16 @@
 
 namespace hpccd::gpu {
 
-// What a frame looks for. Bounds, traversal, lists and results are the same for all; candidates and tests differ.
+// The query of a frame. Bounds, traversal, lists and results are the same for all; candidates and tests differ.
 enum class Query : unsigned char {
   contacts,
-  separations,    // contacts, and pairs that come within a separation above 0 that some meshes have
+  separations,    // contacts, and pairs within a separation above 0 that some meshes have
   proximity,      // of one snapshot: pairs within a distance
-  intersections,  // of one snapshot: edges that pierce or touch faces
+  intersections,  // of one snapshot: edges that intersect or touch faces
 };
 
 constexpr bool of_snapshot(Query q) { return q == Query::proximity || q == Query::intersections; }
-// Whether boxes grow, so that what comes within a distance overlaps.
+// Whether boxes grow, so that boxes of features within a distance overlap.
 constexpr bool grows_boxes(Query q) { return q == Query::separations || q == Query::proximity; }
 
 }  // namespace hpccd::gpu

@@ -51,7 +51,7 @@ __global__ void refit_kernel(LaunchParams<T> params) {
   DeviceBox own = whole;
   store_box(&boxes[node], own);
   while (node != 0) {
-    // Asked for before it is known whether they are needed: each level would wait for them otherwise.
+    // Loaded before it is known whether they are needed: otherwise each level would wait for them.
     const uint2 links = params.node_links[parent];
     const u32 next = params.node_parent[parent];
     cuda::atomic_ref<u32, cuda::thread_scope_device> arrived(arrivals[parent]);
@@ -64,7 +64,7 @@ __global__ void refit_kernel(LaunchParams<T> params) {
   }
 }
 
-// The mean of both ends, times two (motion_box.h), or of the start alone.
+// The mean of both ends, times two (motion_box.h), or the area at the start only.
 __device__ inline float area_of(const DeviceBox& b, bool start_alone) {
   float sum = 0;
   for (int end = 0; end < (start_alone ? 1 : 2); ++end) {
@@ -75,11 +75,11 @@ __device__ inline float area_of(const DeviceBox& b, bool start_alone) {
   return sum;
 }
 
-// Sum of the nodes' areas over the root's (Tree::area), the mean of all worlds. Where boxes reach up to some time,
-// their other end says nothing of the tree.
+// Sum of the nodes' areas divided by the root's (Tree::area), the mean of all worlds. If boxes reach up to an
+// intermediate time, their other end is not used.
 template <class T>
 __global__ void area_kernel(LaunchParams<T> params) {
-  if (over(params)) return;  // nothing was refitted: none is measured
+  if (over(params)) return;  // nothing was refitted, so there is no measure
   double sum = 0;
   for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < params.n_worlds * params.n_nodes;
        i += gridDim.x * blockDim.x) {

@@ -17,11 +17,11 @@ class ResultRows {
  public:
   virtual ~ResultRows() = default;
   virtual ResultPlaces places() const = 0;
-  // Room for so many; where it grows what was there is lost.
+  // Allocates memory for rows; the contents are lost when it grows.
   virtual void reserve(u64 n_vf, u64 n_ee) = 0;
   virtual void reserve_intersections(u64 n_ef) = 0;
   virtual void reserve_worlds(std::size_t n) = 0;
-  // Room for the places of as many rows as there are, and where it is.
+  // Allocates memory for the outputs of as many rows, and returns it.
   virtual PlacesOut reserve_places(u64 n_rows, Outputs outputs) = 0;
   virtual std::size_t device_bytes() const = 0;
 };
@@ -55,7 +55,7 @@ class RowsIn final : public ResultRows {
   }
   void reserve_intersections(u64 n_ef) override { ef_.reserve(n_ef); }
   PlacesOut reserve_places(u64 n_rows, Outputs outputs) override {
-    // As for the rows, and room for more of them.
+    // Like the rows, with spare capacity.
     const u64 n = std::max<u64>(n_rows, vf_.size() + ee_.size());
     if (outputs.points) points_.reserve(3 * n);
     if (outputs.normals) normals_.reserve(3 * n);
@@ -79,12 +79,12 @@ class RowsIn final : public ResultRows {
   Buffer<double, Memory> points_, normals_, closest_;
 };
 
-// Rows that are handed out: they are taken for another frame when nobody holds them any more.
+// Rows for the caller: they are reused for another frame once they are no longer held.
 class RowsPool {
  public:
   explicit RowsPool(bool on_device) : on_device_(on_device) {}
 
-  // Nothing where so many of the host's are held that page-locked memory would become scarce.
+  // Null if so many host rows are held that page-locked memory would become scarce.
   std::shared_ptr<ResultRows> take() {
     for (const auto& rows : rows_)
       if (rows.use_count() == 1) return rows;

@@ -14,7 +14,7 @@ class Memory {
  public:
   explicit Memory(int device) : device_(device) { check(cudaSetDevice(device), "cudaSetDevice"); }
 
-  // n rows behind one another.
+  // n consecutive rows.
   template <class Row>
   const Row* keep(const std::vector<Row>& rows, std::size_t room, std::size_t at, const Row* begin) {
     DeviceBuffer<unsigned char>* to = nullptr;
@@ -27,7 +27,7 @@ class Memory {
       check(cudaMemcpy(const_cast<Row*>(begin) + at, rows.data(), rows.size() * sizeof(Row), cudaMemcpyHostToDevice),
             "cudaMemcpy");
     check(cudaStreamSynchronize(nullptr),
-          "cudaStreamSynchronize");  // from pageable memory it may return before its end
+          "cudaStreamSynchronize");  // a copy from pageable memory may return before its end
     return begin;
   }
   template <class Row>
@@ -50,7 +50,7 @@ class Memory {
       std::make_shared<std::vector<std::unique_ptr<DeviceBuffer<unsigned char>>>>();
 };
 
-// Contacts and pairs that are near each other differ in the names of their values.
+// Contacts and proximity pairs differ in the names of their values.
 template <class Pairs>
 DeviceResults pairs_to_device(const Pairs& p, const std::vector<double>& vf_values,
                               const std::vector<double>& ee_values, int device) {
@@ -106,7 +106,7 @@ std::shared_ptr<const void> joined_on_device(const void* a, std::size_t a_bytes,
   memory->reserve(std::max<std::size_t>(a_bytes + b_bytes, 1));
   if (a_bytes) check(cudaMemcpy(memory->data(), a, a_bytes, cudaMemcpyDefault), "cudaMemcpy");
   if (b_bytes) check(cudaMemcpy(memory->data() + a_bytes, b, b_bytes, cudaMemcpyDefault), "cudaMemcpy");
-  // Device to device, a copy returns before its end: its stream, the default one, is waited for, and no other.
+  // A copy from device to device returns before its end: waits for its stream, the default one, only.
   check(cudaStreamSynchronize(nullptr), "cudaStreamSynchronize");
   return {memory, memory->data()};
 }

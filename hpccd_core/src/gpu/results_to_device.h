@@ -6,15 +6,15 @@
 
 namespace hpccd::gpu {
 
-// Into memory of their own. Throws Error where there is none.
+// Copies into new memory. Throws Error if there is not enough.
 DeviceResults to_device(const Contacts& contacts, int device);
 DeviceResults to_device(const Proximity& pairs, int device);
 DeviceResults to_device(const Intersections& pairs, int device);
 
-// Adds the places of these contacts to results that are there.
+// Adds points and normals of these contacts to existing results.
 void add_places(DeviceResults& results, const Contacts& with_places);
 
-// A copy of two arrays behind one another, wherever they are.
+// A copy of two arrays one after the other, wherever they are.
 std::shared_ptr<const void> joined_on_device(const void* a, std::size_t a_bytes, const void* b, std::size_t b_bytes,
                                              int device);
 

@@ -9,7 +9,7 @@ namespace hpccd::gpu {
 template <Kind kind, bool single>
 __device__ __forceinline__ Outcome<double> root_test(const Motion<double>& m) {
   Outcome<double> o = single ? single_root_test<kind, Proven>(m) : test_in_doubles<kind>(m);
-  // Few are left open, so that only they are worth this filter.
+  // Few pairs are left undecided, so this filter is applied to them only.
   if (!o.contact && !o.none) {
     const Magnitudes<double> size = magnitudes(m);
     o.none = certainly_outside<kind>(m, size) && in_range(size);
@@ -42,13 +42,13 @@ __device__ __forceinline__ void seek_roots(const LaunchParams<T>& params) {
   add_up(&c.undecided_of[k], n_undecided);
 }
 
-// A row of blocks a kind: both at once.
+// One row of blocks per kind, so that both run concurrently.
 template <bool single, class T>
 __global__ __launch_bounds__(128) void roots_kernel(const __grid_constant__ LaunchParams<T> params) {
   blockIdx.y == 0 ? seek_roots<Kind::edge_edge, single>(params) : seek_roots<Kind::vertex_face, single>(params);
 }
 
-// Clears the lists of one segment for the next; remembers how long they were and how long they had to be.
+// Clears the lists of one segment for the next; records their lengths and required lengths.
 template <class T>
 __global__ void end_segment_kernel(LaunchParams<T> params) {
   Counters& c = *params.counters;

@@ -7,7 +7,7 @@
 
 namespace hpccd::gpu {
 
-// Both ends of the step, for pairs with a separation; those without go on to their root tests.
+// Tests both ends of the step, for pairs with a separation; the others go to their root tests.
 template <Kind kind, class T>
 __global__ __launch_bounds__(128) void separation_filter_kernel(const __grid_constant__ LaunchParams<T> params) {
   constexpr u32 k = kind == Kind::edge_edge;

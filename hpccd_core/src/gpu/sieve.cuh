@@ -19,7 +19,7 @@ __device__ __forceinline__ SortedPair sort_out(const Motion<R>& m) {
   const Cubic<R> f = coplanarity(m);
   const CubicError<R> error = error_of<Policy>(size);
   const bool usable = in_range(size);
-  // Those of a near list have passed no filter yet.
+  // Pairs of a near list have not passed a filter yet.
   if (certainly_no_root(f, error.coefficient) && usable) return {{false, false}, false};
   if (certainly_one_root(f, error.coefficient) && usable) {
     const bool missed = certainly_apart_at_root<kind>(m, size, f, error.value);
@@ -47,13 +47,13 @@ __device__ __forceinline__ void sort_survivors(const LaunchParams<T>& params) {
   add_up(&c.missed[k], n_missed);
 }
 
-// A row of blocks a kind: both at once.
+// One row of blocks per kind, so that both run concurrently.
 template <class Policy, class T>
 __global__ __launch_bounds__(128) void sort_survivors_kernel(const __grid_constant__ LaunchParams<T> params) {
   blockIdx.y == 0 ? sort_survivors<Kind::edge_edge, Policy>(params) : sort_survivors<Kind::vertex_face, Policy>(params);
 }
 
-// From no information on. The bits of its time do not depend on who asked before.
+// Starts without information, so that the bits of the time do not depend on previous tests.
 template <Kind kind>
 __device__ __forceinline__ Outcome<double> test_in_doubles(const Motion<double>& m) {
   const RootTests wanted = sort_out<kind, Proven>(m).wanted;

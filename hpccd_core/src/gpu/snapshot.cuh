@@ -11,7 +11,7 @@
 
 namespace hpccd::gpu {
 
-// What a warp finds waits in shared memory for more: a place in the list of all is a wait for the counter.
+// A warp collects its results in shared memory: a position in the global list costs a wait for the counter.
 struct FoundQueue {
   static constexpr u32 room = 96;
   u64 keys[room];
@@ -36,7 +36,7 @@ __device__ __forceinline__ void flush_found(const LaunchParams<T>& params, const
   __syncwarp();
 }
 
-// n: in the queue. All lanes must call.
+// n: number of elements in the queue. All lanes must call.
 template <class T>
 __device__ __forceinline__ void queue_found(const LaunchParams<T>& params, FoundQueue& s, u32& n, Kind kind,
                                             bool wanted, uint2 pair, double toc) {
@@ -51,7 +51,7 @@ __device__ __forceinline__ void queue_found(const LaunchParams<T>& params, Found
   if (n > FoundQueue::room - 32) flush_found(params, s, n);
 }
 
-// Whether the fallback would find at once that they touch.
+// Whether the fallback would find immediately that they touch.
 template <Kind kind, class T>
 __device__ inline bool certainly_touch(const LaunchParams<T>& params, uint4 v) {
   const u32 vertex[4] = {v.x, v.y, v.z, v.w};
@@ -60,7 +60,7 @@ __device__ inline bool certainly_touch(const LaunchParams<T>& params, uint4 v) {
   return share_a_place<kind == Kind::vertex_face ? 1 : 2>(q);
 }
 
-// Where vertices of a snapshot are, as the caller gave them.
+// Positions of a snapshot's vertices in the caller's precision.
 __device__ inline Vec3<float> load_start(const GivenEnds<float>* vertices, u32 v) {
   const float4 a = __ldg(&vertices[v].t0);
   return {a.x, a.y, a.z};
@@ -83,8 +83,8 @@ __device__ __forceinline__ Snapshot<double> snapshot_of(const PairStarts<T>& giv
   return {m.p0, m.a0, m.b0};
 }
 
-// Distances stand where contacts have their times. With the queue, and with the vertices of the next pair on their way,
-// 40 million pairs take 1.9 ms instead of 2.8 (H100): warps waited for the counter of what is found.
+// Distances take the place of times. With the queue, and with prefetching of the next pair's vertices, 40 million pairs
+// take 1.9 ms instead of 2.8 (H100): warps waited for the counter of results.
 template <Kind kind, class T>
 __device__ __forceinline__ void test_proximity(const LaunchParams<T>& params, FoundQueue& queue) {
   constexpr u32 k = kind == Kind::edge_edge;
@@ -121,7 +121,8 @@ __device__ __forceinline__ void test_proximity(const LaunchParams<T>& params, Fo
 
 inline constexpr u32 proximity_threads = 128;
 
-// A row of blocks a kind: both at once. (With six blocks a multiprocessor registers spill, and it is slower.)
+// One row of blocks per kind, so that both run concurrently. (With six blocks per multiprocessor registers spill, and
+// it is slower.)
 template <class T>
 __global__ __launch_bounds__(proximity_threads,
                              5) void proximity_kernel(const __grid_constant__ LaunchParams<T> params) {
@@ -139,7 +140,7 @@ __device__ inline void load_edge_face(const LaunchParams<T>& params, u32 edge, u
   for (int i = 0; i < 5; ++i) q[i] = load_ends(params.vertices, world * params.n_vertices + v[i]).t0;
 }
 
-// Pairs of edge and face use the lists of the first kind.
+// Edge-face pairs use the lists of the first kind.
 template <class T>
 __global__ __launch_bounds__(128) void intersection_kernel(const __grid_constant__ LaunchParams<T> params) {
   constexpr u32 k = 0;

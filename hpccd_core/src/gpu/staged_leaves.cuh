@@ -14,9 +14,10 @@ struct StagedLeaves : CandidateQueue {
   // The second features of pairs: edges of the second leaf, its faces, and those of the first.
   __device__ static constexpr u32 faces_at(u32 side) { return most_edges + (side ? 0 : most_faces); }
   static constexpr u32 n_second = most_edges + 2 * most_faces;
-  // Of both leaves, at both ends. Tags: the vertex; by how much boxes grow at the second end.
+  // Of both leaves, at both ends. Tags: the vertex; the amount by which boxes grow at the second end.
   Bound corner[2][2][most_corners];
-  // The four words of a box lie apart, so that neighbouring lanes read neighbouring words: low at both ends, high.
+  // The four words of a box are stored separately, so that neighbouring lanes read neighbouring words: low at both
+  // ends, high.
   Bound edge[4][most_edges], second[4][n_second];
   u32 first_number[most_edges], second_number[n_second], corner2[2 * most_faces];
   u32 vertex[2][most_corners];  // which corners
@@ -33,7 +34,7 @@ struct StagedLeaves : CandidateQueue {
   __device__ DeviceBox second_box(u32 at) const {
     return {{load(second[0][at]), load(second[1][at])}, {load(second[2][at]), load(second[3][at])}};
   }
-  // Of a corner in a feature with others.
+  // The box of a corner that is part of a feature.
   __device__ DeviceBox grown_corner(u32 side, u32 c) const {
     const Bound t0 = load(corner[side][0][c]), t1 = load(corner[side][1][c]);
     DeviceBox b{{t0, t1}, {t0, t1}};
@@ -43,12 +44,12 @@ struct StagedLeaves : CandidateQueue {
   }
 };
 
-// How many features of each leaf were staged.
+// The number of staged features of each leaf.
 struct StagedCounts {
   u32 edges[2], faces[2], vertices[2];
 };
 
-// A leaf, the vertex of the lane's corner, where that is, and the lane's edge or face.
+// A leaf, the vertex of the lane's corner, its position, and the lane's edge or face.
 struct FetchedLeaf {
   DeviceLeaf leaf;
   u32 corner;
@@ -56,7 +57,7 @@ struct FetchedLeaf {
   LeafFeature feature;
 };
 
-// What does not wait for anything but the leaf.
+// Data that depends only on the leaf.
 template <class T>
 __device__ __forceinline__ FetchedLeaf begin_leaf(const LaunchParams<T>& params, const DeviceLeaf& leaf, u32 world) {
   constexpr u32 most = StagedLeaves::most_edges;
@@ -87,7 +88,7 @@ __device__ __forceinline__ void stage_corners(StagedLeaves& s, const FetchedLeaf
   store(&s.corner[side][1][lane], l.t1);
 }
 
-// Edges and faces of one of the two leaves that overlap the other, whose corners are staged.
+// Stages the edges and faces of one of the two leaves that overlap the other; the corners are staged already.
 template <u32 side>
 __device__ __forceinline__ void stage_edges_and_faces(StagedLeaves& s, const FetchedLeaf& l, const DeviceBox& other,
                                                       u32 tested, StagedCounts& n) {
@@ -128,7 +129,7 @@ __device__ __forceinline__ void stage_edges_and_faces(StagedLeaves& s, const Fet
   }
 }
 
-// Vertices of one of them, its first corners.
+// Stages the vertices of one of them, which are its first corners.
 template <u32 side>
 __device__ __forceinline__ void stage_vertices_of(StagedLeaves& s, const FetchedLeaf& l, const DeviceBox& other,
                                                   u32 tested, StagedCounts& n) {

@@ -9,7 +9,7 @@
 
 namespace hpccd::gpu {
 
-// Blocks of a kernel that fit on one multiprocessor of the current device; looked up once.
+// The number of a kernel's blocks that fit on one multiprocessor of the current device; determined once.
 int blocks_that_fit(const void* kernel, unsigned threads, const char* name);
 
 struct Stages {
@@ -17,7 +17,7 @@ struct Stages {
   cudaStream_t stream;
   StageTimer& timer;
 
-  // As many blocks as fit take work until there is none. Rows: of so many lists, each has as many.
+  // As many blocks as fit; they take work until there is none. Rows: number of lists, each with that many blocks.
   template <class Kernel, class T>
   void persistent(Kernel kernel, unsigned threads, const LaunchParams<T>& params, const char* name,
                   unsigned rows = 1) const {
@@ -25,7 +25,7 @@ struct Stages {
     kernel<<<dim3(static_cast<unsigned>(blocks * multiprocessors), rows), threads, 0, stream>>>(params);
     check_launch(name);
   }
-  // A thread an item of up to `most`; its last argument is how many warps are at work at a time (item_of_thread.cuh).
+  // One thread per item, up to `most` items; the last argument is the number of concurrent warps (item_of_thread.cuh).
   template <class Kernel, class Task>
   void one_item_each(Kernel kernel, unsigned threads, u64 most, const char* name, const Task& task) const {
     if (most == 0) return;
@@ -37,21 +37,20 @@ struct Stages {
   void mark(const char* name) const { timer.mark(name, stream); }
 };
 
-// What the hints say of the best time. Defined for float and double.
+// The best time from the hints. Defined for float and double.
 template <class T>
 void launch_hints(Query query, const LaunchParams<T>& params, const Stages& stages);
 
-// From pairs of leaves to contacts and what the fallback decides, in single precision first. Defined for float and
+// From pairs of leaves to contacts and the fallback's decisions, in single precision first. Defined for float and
 // double.
 template <class T>
 void launch_likely(const LaunchParams<T>& params, const Stages& stages);
 
-// What the fallback leaves open. Defined for float and double.
+// Decides what the fallback leaves undecided. Defined for float and double.
 template <class T>
 void launch_integers(const LaunchParams<T>& params, const Stages& stages);
 
-// From pairs of leaves to survivors of the first filter, and the tests that know a distance. Defined for float and
-// double.
+// From pairs of leaves to survivors of the first filter, and the tests with a distance. Defined for float and double.
 template <class T>
 void launch_separation_candidates(const LaunchParams<T>& params, const Stages& stages);
 template <class T>

@@ -46,7 +46,7 @@ class Event {
   cudaEvent_t event_ = nullptr;
 };
 
-// Work that is submitted again and again, by one call instead of one for each of its kernels.
+// Work that is submitted repeatedly, with one call instead of one per kernel.
 class Graph {
  public:
   Graph() = default;
@@ -54,7 +54,7 @@ class Graph {
   Graph(const Graph&) = delete;
   Graph& operator=(const Graph&) = delete;
 
-  // Records what `submit` puts on the stream, instead of doing it.
+  // Records the work that `submit` enqueues, without running it.
   template <class Submit>
   void record(cudaStream_t stream, Submit&& submit) {
     drop();
@@ -84,7 +84,7 @@ class Graph {
   cudaGraphExec_t graph_ = nullptr;
 };
 
-// Device time between marks on the stream; recorded only where asked for, since each mark costs a microsecond.
+// Device time between marks on the stream; recorded on request only, since each mark costs a microsecond.
 class StageTimer {
  public:
   explicit StageTimer(bool on) : on_(on) {}

@@ -26,8 +26,8 @@ class TestLists {
       to_host = std::max(to_host, s.to_host);
     }
   };
-  // A start that most scenes outgrow once or never; lists grow where they overflow.
-  // Few pairs come to integers; each place on that list costs the start of a thread (stages.cuh).
+  // Initial sizes that most scenes outgrow once or never; lists grow when they overflow. Few pairs need integers; each
+  // place on that list costs the start of a thread (stages.cuh).
   TestLists(std::size_t survivors, std::size_t later, std::size_t undecided) {
     reserve({{survivors, survivors}, {later, later}, {later, later}, {0, 0}, undecided, undecided / 8, undecided});
   }
@@ -58,10 +58,10 @@ class TestLists {
     visit(answers_), visit(undecided_), visit(to_host_);
   }
 
-  // Where the pairs come from that pass the first filter.
+  // The source of the pairs that pass the first filter.
   enum class From : bool { leaves, near_list };
-  // All stages on pairs of leaves that the frame lists, or on the survivors that are there already; the frame's
-  // counters were cleared, its contacts have a place. Defined for float and double.
+  // All stages on the pairs of leaves that the frame lists, or on existing survivors; the frame's counters must be
+  // cleared, and memory for contacts allocated. Defined for float and double.
   template <class T>
   void launch(Query query, From from, LaunchParams<T>& params, int multiprocessors, cudaStream_t stream,
               StageTimer& timer);
@@ -82,11 +82,11 @@ class TestLists {
     params.to_host = to_host_.data(), params.to_host_capacity = to_host_.size();
   }
 
-  // For so many survivors of one kind.
+  // Allocates memory for survivors of one kind.
   void make_room(std::size_t n) {
     for (auto& list : survivors_) list.reserve(n);
   }
-  // Makes room where a list was too short. True where the pairs must be tested again.
+  // Enlarges lists that were too short. True if the pairs must be tested again.
   bool grow(const Counters& c, From from) {
     bool again = false, more_segments = false;
     const auto grow = [&](auto& buffer, u64 needed, bool divisible) {
@@ -131,11 +131,11 @@ class TestLists {
   DeviceBuffer<u64> undecided_, open_[integer_sizes];
   DeviceBuffer<double> answers_;
   PinnedBuffer<u64> to_host_;
-  // Lists of one pass stay below this; larger frames take several segments.
+  // Lists of one pass stay below this size; larger frames take several segments.
   static constexpr std::size_t most_listed = std::size_t{1} << 26;
   u32 n_segments_ = 1;
 
-  // Full of answers that are awaited (integer_stages.cu); done when this returns, whatever stream the kernels are on.
+  // Allocates results in the initial state (integer_stages.cu); complete when this returns, for kernels on any stream.
   void reserve_answers(std::size_t n) {
     if (n <= answers_.size()) return;
     answers_.reserve(n);

@@ -12,10 +12,10 @@ namespace hpccd::gpu {
 
 inline constexpr u32 traverse_warps = 4;
 inline constexpr u32 traverse_leaves = 8;
-// A number of a node or leaf, and above it which of the warp's leaves is meant.
+// A number of a node or leaf, and above it the index of the warp's leaf.
 inline constexpr u32 traverse_number_bits = 29, most_nodes = 1u << traverse_number_bits;
 static_assert(traverse_leaves <= 1u << (32 - traverse_number_bits));
-// A batch of 32 nodes puts at most 32 more on the stack than it takes off, and lies a level deeper: 32 * (depth + 1).
+// A batch of 32 nodes pushes at most 32 more nodes than it pops, one level deeper: 32 * (depth + 1).
 inline constexpr u32 traverse_depth = 40;
 inline constexpr u32 traverse_stack = 32 * (traverse_depth + 2);
 inline constexpr u32 traverse_found = 256;
@@ -26,11 +26,11 @@ __device__ bool meshes_enabled(const LaunchParams<T>& params, u32 mesh_a, u32 me
   return params.enabled[mesh_a * params.n_meshes + mesh_b];
 }
 
-// Of one warp.
+// The state of one warp.
 struct TraverseSpace {
   u32 stack[traverse_stack], found[traverse_found];
-  // Of its leaves: boxes, whose four words lie apart, with their number and mesh as tags; the first node of their
-  // world.
+  // Its leaves: boxes, whose four words are stored separately, with their number and mesh as tags; the first node of
+  // their world.
   Bound bound[4][traverse_leaves];
   u64 first_node[traverse_leaves];
 
@@ -43,7 +43,7 @@ struct TraverseSpace {
   }
 };
 
-// What was found, one leaf after the other: those who read the list find pairs of the same leaf together.
+// Writes the pairs, one leaf after the other, so that readers of the list find pairs of the same leaf together.
 template <class T>
 __device__ __forceinline__ void flush_leaf_pairs(const LaunchParams<T>& params, const TraverseSpace& s, u32 first_leaf,
                                                  u32 n) {

@@ -10,7 +10,7 @@ inline constexpr u32 all_lanes = 0xFFFFFFFFu;
 
 __device__ inline u32 lane_number() { return threadIdx.x & 31; }
 
-// A place for each lane with `wants`, by one atomic a warp. All lanes must call.
+// A place for each lane with `wants`, by one atomic operation per warp. All lanes must call.
 __device__ inline u64 warp_append(u64* counter, bool wants) {
   const u32 mask = __ballot_sync(all_lanes, wants);
   if (!mask) return 0;

@@ -23,7 +23,7 @@ __device__ bool find_places(const PlacesOut& out, const OpenRow& row) {
   return !arbiter.open;
 }
 
-// False where they stay open.
+// False if they stay open.
 template <class Arbiter>
 __device__ bool find_places(const PlacesTask& task, const OpenRow& row) {
   return row.row < task.n_vf ? find_places<Arbiter, Kind::vertex_face>(task.out, row)
