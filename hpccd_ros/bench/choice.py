@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a user may set, what each way to ask less of a step has to find, and the cheapest setting that keeps bounds.
+"""Settings, the contacts that each of them must find, and the cheapest setting within bounds on its errors.
 
 Options have the names of hpccd_core.Detector, which are those of the node's parameters too.
 """
@@ -18,8 +18,8 @@ from hpccd_ros.bench import truth
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Asked:
-    """What is asked of a step. Wrong answers count against this, not against all contacts: to ask for less is a choice
-    of the modelling. kinds: of contacts. one: "" for all of them, or one of them: "earliest", "any"."""
+    """The requested contacts of a step. Errors are relative to these, not to all contacts: requesting fewer is a choice
+    of the model. kinds: of contacts. one: "" for all of them, or one of them: "earliest", "any"."""
 
     name: str
     options: dict = dataclasses.field(default_factory=dict)
@@ -32,7 +32,7 @@ class Asked:
         return truth.of_one(found, wanted, self.one == "earliest") if self.one else truth.of_scene(found, wanted)
 
 
-# A further option that asks for less is a line here. Its values are words, or tuples of words.
+# Options that request fewer contacts, one per line. Values are words, or tuples of words.
 ASKED = (
     Asked("all"),
     Asked("first", {"report": "first"}, one="earliest"),
@@ -41,7 +41,7 @@ ASKED = (
     Asked("edge_edge", {"features": ("edge_edge",)}, kinds=("ee",)),
 )
 ALL = ASKED[0].name
-# What may be bounded, as --help explains. Of several scenes the worst counts.
+# Quantities that may be bounded, as --help explains. The worst of several scenes counts.
 QUANTITIES = {
     "misses": lambda row: row["missed"] / max(1, row["true"]),
     "inventions": lambda row: row["invented"] / max(1, row["reported"]),
@@ -50,14 +50,14 @@ QUANTITIES = {
     "error": lambda row: row["toc_worst"],
 }
 EXAMPLE = '--choose "misses<1e-4, late<1e-3"'
-# Settings that are as near are equally fast as far as the clock can tell: the more accurate one is taken.
+# Settings within this ratio count as equally fast: the more accurate one is selected.
 AS_FAST = 1.05
 _BOUND = re.compile(r"(?P<quantity>[a-z]+)\s*(?P<sign><=?)\s*(?P<limit>[^<=>\s]+)")
 
 
 @dataclasses.dataclass(frozen=True)
 class Setting:
-    """A tier, a backend, and what is asked."""
+    """A tier, a backend, and the requested contacts."""
 
     accuracy: str
     backend: str
@@ -67,7 +67,7 @@ class Setting:
         return f"{self.accuracy} on {self.backend}" + ("" if self.asked == ALL else f", {self.asked}")
 
     def as_written(self) -> str:
-        """In Python and as parameters of the node."""
+        """The setting as Python code and as parameters of the node."""
         asked = next(a.options for a in ASKED if a.name == self.asked)
         options = {"accuracy": self.accuracy, "backend": self.backend, **asked}
         python, node = [], []
@@ -92,7 +92,7 @@ class Bound:
 
 
 def parse(text: str) -> list[Bound]:
-    """Bounds as "misses<1e-4, late<=1e-3"; UserError for all else."""
+    """Parse bounds such as "misses<1e-4, late<=1e-3"; UserError for anything else."""
     words = [word.strip() for word in text.split(",") if word.strip()]
     if not words:
         raise UserError(f"--choose: name at least one bound, as in {EXAMPLE}")
@@ -123,7 +123,7 @@ def parse(text: str) -> list[Bound]:
 
 @dataclasses.dataclass(frozen=True)
 class Outcome:
-    """What one setting did on all scenes: ms of an average step, and the worst of each quantity."""
+    """Results of one setting on all scenes: ms of an average step, and the worst of each quantity."""
 
     setting: Setting
     ms: float
@@ -168,14 +168,14 @@ def front(found: Sequence[Outcome]) -> list[Outcome]:
 
 
 def cheapest(found: Sequence[Outcome], bounds: Sequence[Bound]) -> Outcome | None:
-    """None where no setting keeps all bounds."""
+    """None if no setting is within all bounds."""
     keep = [o for o in found if not o.broken(bounds)]
     fast = [o for o in keep if o.ms <= AS_FAST * min(o.ms for o in keep)]
     return min(fast, key=lambda o: (o.wrong, o.values["error"], o.ms), default=None)
 
 
 def nearest(found: Sequence[Outcome], bounds: Sequence[Bound]) -> Outcome:
-    """The one that goes beyond its worst bound by the smallest factor."""
+    """The setting that exceeds its worst bound by the smallest factor."""
 
     def beyond(o: Outcome) -> float:
         least = 1e-300  # so that any answer is far beyond a bound of zero

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options that the benchmarks share, and how each begins."""
+"""Shared options and set-up of the benchmarks."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def listed(option: str, text: str, choices: Sequence[str]) -> list[str]:
 
 
 def usable(name: str, text: str, choices: Sequence[str], **others) -> tuple[list[str], dict[str, str]]:
-    """The values of --NAME that work here, and why the others do not; UserError where none does."""
+    """The values of --NAME that work here, and why the others do not; UserError if none does."""
     found, refused = measure.usable(name, listed(f"--{name}", text, choices), **others)
     if not found:
         raise UserError(f"--{name} {text}: none of these works here; see `hpccd info`")
@@ -76,7 +76,7 @@ def usable(name: str, text: str, choices: Sequence[str], **others) -> tuple[list
 
 
 def begin(args, resolve: Callable = sources.resolve) -> tuple[Report, list[sources.Source]]:
-    """The report to fill and the sources that were asked for; UserError for wrong options, before anything is timed."""
+    """The report to fill and the selected sources; UserError for wrong options, before anything is timed."""
     if not 1 <= args.repeat <= MOST_ROUNDS:
         raise UserError(f"--repeat {args.repeat}: time from 1 to {MOST_ROUNDS:,} rounds")
     for name in ("steps", "threads"):
@@ -118,7 +118,7 @@ def measured(args) -> int:
 
 
 def require_writable(option: str, path: Path) -> None:
-    """Before anything is measured: what cannot be written would be lost."""
+    """Called before anything is measured, so that no result is lost."""
     target = Path(os.path.realpath(path))  # a link that leads nowhere yet stays
     try:
         new = not target.exists()

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ms a step of each scene (average, median, 95th percentile), and the stages that they divide into.
+"""ms per step of each scene (average, median, 95th percentile), and of each stage.
 
   hpccd bench cpu n-body-like-lr            a generated scene, in under a minute
   hpccd bench cpu run.mcap --steps 0        every step of a recording
-  hpccd bench cpu part.obj                  a mesh file, through which a copy of it moves
+  hpccd bench cpu part.obj                  a mesh file, with a copy that moves through it
   hpccd bench cpu run.mcap --report all,first,any
-                                            the time saved where not every contact is needed
+                                            the time saved if not every contact is needed
 
-An average step is the load of a simulation; plan an interactive one for the 95th percentile.
+The average predicts the total time of a simulation; use the 95th percentile for interactive programs.
 """
 
 from __future__ import annotations

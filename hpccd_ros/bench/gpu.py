@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ms a step on the CPU, on the hybrid backend and on the GPU, with arrays of the host and, where PyTorch or CuPy is
-installed, with positions and contacts that stay on the device. Needs an NVIDIA GPU.
+"""ms per step on the CPU, on the hybrid backend and on the GPU, with host arrays and, if PyTorch or CuPy is installed,
+with positions and contacts that stay on the device. Needs an NVIDIA GPU.
 
   hpccd bench gpu run.mcap --steps 8        a recording
   hpccd bench gpu data                      the scene files of HPCCD_DATA, balanced and exact
 
-Fails where contacts differ from the CPU's, or where a device left a step to the CPU.
+Fails if contacts differ from the CPU's, or if a device left a step to the CPU.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def configure(parser):
 
 
 def to_device():
-    """A function that copies a step to the device; None where neither PyTorch nor CuPy is installed."""
+    """A function that copies a step to the device; None if neither PyTorch nor CuPy is installed."""
     for name, copy in LIBRARIES.items():
         try:
             library = importlib.import_module(name)

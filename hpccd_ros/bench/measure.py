@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The timing loop: variants in turn on the same steps, so that whatever disturbs the machine disturbs all alike.
+"""The timing loop: variants alternate on the same steps, so that disturbances of the machine affect all alike.
 
 One call of `detect` (or of another query) is timed, with its argument checks and result arrays; where the topology
 changed, making scene and detector too. Not timed: reading or generating the step, the first round (warm-up), and, where
@@ -162,7 +162,7 @@ class Series:
         return dict(stages)
 
     def stats(self) -> dict[str, float]:
-        """Counts of an average step; "candidates": pairs of features tested."""
+        """Counts of an average step; "candidates": tested pairs of features."""
         total: dict[str, float] = defaultdict(float)
         for samples in self.by_step.values():
             for key, value in samples[-1].stats.items():
@@ -230,7 +230,7 @@ def _in_turn(ms: float) -> int:
 
 
 def disagreements(series: dict[str, Series]) -> list[str]:
-    """Where runners that must find the same contacts do not, in words."""
+    """Sentences about runners that must find the same contacts but do not."""
     texts = []
     for step in sorted({step for one in series.values() for step in one.by_step}):
         seen = {name: {s.hash for s in one.by_step.get(step, ())} for name, one in series.items()}

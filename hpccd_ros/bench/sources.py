@@ -126,7 +126,7 @@ def resolve(words: Sequence[str], data: Path | None, default: Sequence[str], siz
         raise UserError(
             "nothing to measure: name a scene (see `hpccd scene --list`), a recording or a mesh file, or set HPCCD_DATA"
         )
-    # Files of one name get names of their own: results are kept by name.
+    # Files with the same name get different names, because results are kept by name.
     names = [source.name for _, source in found]
     return [
         dataclasses.replace(source, name=word) if names.count(source.name) > 1 else source for word, source in found

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Found pairs against the true ones: missed, invented, and how far times of contact, or distances, are off."""
+"""Reported pairs compared with the true ones: false negatives, false positives, errors of times or distances."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 
 @dataclasses.dataclass(frozen=True)
 class Errors:
-    """missed, invented: numbers of pairs. toc_worst, toc_p99: of |toc - true toc| over pairs found and true, 0 where
-    there are none; latest: of toc - true toc; earliest: of true toc - toc. Of distances likewise, over the size of what
-    they were measured in."""
+    """missed, invented: numbers of false negatives and false positives. toc_worst, toc_p99: of |toc - true toc| over
+    true pairs that were found, 0 if there are none; latest: of toc - true toc; earliest: of true toc - toc. The same
+    for distances, relative to the size of the scene or query."""
 
     true: int
     missed: int
@@ -40,8 +40,8 @@ def of_scene(found, truth: dict[str, np.ndarray], value: str = "toc", size: floa
 
 
 def of_one(found, truth: dict[str, np.ndarray], earliest: bool) -> Errors:
-    """Of an answer that is to name one contact, the earliest or any, where there is one. Missed: it named none; times:
-    of the earliest one, or of the one that it named."""
+    """Errors of a result that must contain one contact, the earliest or any, if there is one. Missed: it has none;
+    times: of the earliest one, or of the reported one."""
     of_named = of_scene(found, truth)
     true = np.concatenate([toc for key, toc in truth.items() if key.endswith("_toc")])
     there, missed = min(1, len(true)), int(len(true) > 0 and len(found) == 0)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The node: its life cycle, and the wiring of what the other packages hold."""
+"""The node: its life cycle, and the connections between the other packages."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All that the node counts, from its start to its end, and the log of what it refuses. No ROS."""
+"""All counters of the node, from its start to its end, and the log of rejected messages. No ROS."""
 
 import math
 import time
@@ -14,12 +14,12 @@ from hpccd_ros.frames.taken_inputs import TakenInputs
 from hpccd_ros.frames.types import Outcome, SceneFrame
 from hpccd_ros.node.metrics import Metrics
 
-# Of no mesh: name of their count among ``connections``.
+# Messages of no mesh: name of their count in ``connections``.
 REFUSED_BESIDE_MESHES = {Input.TRANSFORM: "transforms_refused", Input.JOINT_STATE: "joint_states_refused"}
 
 
 class Accounts:
-    """``dropped``: vertex messages. ``connections``: what the middleware tells of its topics (name -> count).
+    """``dropped``: vertex messages. ``connections``: reports of the middleware about topics (name -> count).
 
     ``static_taken``: accepted messages of static meshes, which count as answered. ``requests``: to ~/detect, service
     and action, by how they ended. ``inputs``: those taken since the node was configured. warn: logs a text.
@@ -42,7 +42,7 @@ class Accounts:
         self.on_received: Callable[[str, str, dict[str, Any]], None] = lambda kind, name, info: None
 
     def add(self, outcome: Outcome) -> None:
-        """What came of a message, but for the frames: those are counted when they are answered."""
+        """Count the outcome of a message except its frames, which are counted when they are computed."""
         for text in outcome.restarts:
             self.restarts += 1
             self._warn(text)
@@ -56,7 +56,7 @@ class Accounts:
         self.log.together(outcome.refusals)
 
     def refused(self, refusal: Refusal) -> None:
-        """Counted, and logged where there is something to say."""
+        """Count it, and log its text if it has one."""
         self._count(refusal)
         self.log.together([refusal])
 
@@ -68,7 +68,7 @@ class Accounts:
         self.on_refused(refusal)
 
     def answered(self, found: Detection, total: int, sent: int) -> None:
-        """One step: ``total`` contacts were found, ``sent`` of them have just been published."""
+        """Count a step: ``total`` contacts were found, ``sent`` of them have just been published."""
         latency_ms = 1e3 * (time.monotonic() - found.end.received)
         near = found.near
         last = {
@@ -92,34 +92,35 @@ class Accounts:
         self.metrics.detected(len(found.end.fresh), *times, found.profile, last, near, _coarse(found))
 
     def unanswered(self, frame: SceneFrame, reason: Reason) -> None:
-        """A frame that the detection was given and that gets no answer."""
+        """Count a frame that was passed to the detection and has no result."""
         for refusal in frame.refused(reason):
             self.refused(refusal)
 
     def failed(self, frame: SceneFrame, error: Exception) -> None:
-        """Why the step that ends with ``frame`` is `unanswered`."""
+        """Count the step that ends with ``frame`` as failed, with the reason."""
         self.metrics.failed(f"{type(error).__name__}: {error}")
         self.log("scene", Reason.DETECTION_FAILED, f"step that ends at {frame.stamp} ns: {error}")
 
 
 def _coarse(found: Detection) -> str:
-    """Which mesh's motion is bounded by more than the tolerance, although the step was cut as often as it may be."""
+    """A sentence if the motion bound of a mesh exceeds the tolerance although the step has the maximum of parts."""
     bounds, rigid = found.bounds, found.options.rigid
     if bounds.parts < rigid.most_parts:
         return ""
     mesh, bound = max(zip(found.layout.mesh_names, bounds.of_meshes, strict=True), key=lambda one: one[1])
-    # The bound has what rounding adds, of which the tolerance says nothing.
+    # The bound includes rounding, which the tolerance does not.
     if bound <= 1.01 * rigid.tolerance:
         return ""
     return f"{mesh} was up to {bound:.3g} beside the straight lines of {bounds.parts} parts"
 
 
-# Texts quote what publishers sent (frame names, field names), which may be of any length.
+# Texts quote untrusted names (of frames, of fields), which may be of any length.
 _LONGEST = 500
 
 
 class RefusalLog:
-    """Hands on the first text of each (mesh, reason), then one every ``period`` s. Links of a robot are as one mesh."""
+    """Passes on the first text of each (mesh, reason), then one every ``period`` s; links of a robot count as one
+    mesh."""
 
     def __init__(
         self, warn: Callable[[str], None], period: float = 10.0, clock: Callable[[], float] = time.monotonic

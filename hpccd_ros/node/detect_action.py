@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Action ``~/detect``: what the service answers, with feedback, and given up when the goal is canceled."""
+"""Action ``~/detect``: the queries of the service, with feedback, cancelled with the goal."""
 
 import itertools
 import math
@@ -18,11 +18,11 @@ from hpccd_ros.node.detect_query import WAITING
 from hpccd_ros.node.detect_service import DELIVERY, FAREWELL, ROOM_TO_REFUSE
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 
-# s between two pieces of feedback of a goal.
+# s between feedback messages of a goal.
 PERIOD = 0.2
-# Goals that are told in one period, each in its turn: with thousands of them the node would do little else.
+# Goals that get feedback in one period, in turn: with thousands of them the node would do little else.
 MOST_TOLD = 50
-# Contacts in all results that are kept: some 100 MB.
+# Contacts in all kept results: about 100 MB.
 MOST_KEPT = 1_000_000
 CANCELED = "canceled: as the client asked"
 DEACTIVATED = (
@@ -35,8 +35,8 @@ FORGOTTEN = (
 
 
 class DetectAction:
-    """Each goal gets the answer of ``jobs``: it succeeds with one, is canceled where the client asked for it, and is
-    aborted, with the reason as message, where the service refuses.
+    """Each goal gets the result of ``jobs``: it succeeds with one, is canceled if the client requests it, and is
+    aborted, with the reason as message, if the service would reject it.
     """
 
     def __init__(self, node: GuardedLifecycleNode, jobs: DetectJobs) -> None:
@@ -64,12 +64,12 @@ class DetectAction:
         )
 
     def stop(self) -> None:
-        """The goals that are open are aborted at the executor's next turn."""
+        """Open goals are aborted at the executor's next turn."""
         for _, ticket in tuple(self._open.values()):
             ticket.give_up("stopped", DEACTIVATED)
 
     def close(self) -> None:
-        """End all goals, then the action. In the thread of the executor; behind ``jobs.close()``."""
+        """End all goals, then the action. In the thread of the executor; after ``jobs.close()``."""
         executor = self._node.executor
         if executor is not None and self._node.context.ok():
             self._server.finish(executor, FAREWELL)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Requests to ``~/detect``, from service and action: queued, computed outside of the executor, answered."""
+"""Requests to ``~/detect``, from service and action: queued, computed outside the executor, answered."""
 
 import math
 import threading
@@ -25,7 +25,7 @@ from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 
 # s, the longest time limit: rclpy's timers count nanoseconds in 64 bits, 292 years.
 LONGEST = 86_400.0
-# How to ask for less: of queries that can.
+# The remedy for large requests, by query.
 _LESS = {"contacts": "ask for less (report first), or ", "proximity": "ask for a smaller distance, or "}
 STOPPED = "stopped: the node was shut down or cleaned up before the answer was ready; ask again when it is active"
 
@@ -33,9 +33,9 @@ R = TypeVar("R", bound=Response)
 
 
 class Ticket:
-    """``stage``: what is done for it now. ``ended``: how it ended, a name in Accounts.requests; "" before.
+    """``stage``: the current stage of its work. ``ended``: how it ended, a name in Accounts.requests; "" before.
 
-    on_place: called when it has found a place among those that are computed or wait.
+    on_place: called when it is accepted: computed or queued.
     """
 
     def __init__(self, stage: str, on_place: Callable[[], None] = lambda: None) -> None:
@@ -50,15 +50,15 @@ class Ticket:
 
     @property
     def seconds(self) -> float:
-        """Since it came."""
+        """Seconds since its arrival."""
         return time.monotonic() - self._since
 
     def enter(self, stage: str) -> None:
-        """From the thread that computes."""
+        """Called by the computing thread."""
         self.stage = stage
 
     def give_up(self, ended: str, why: str) -> None:
-        """It is answered with ``why``, now, unless it was given up before. From the executor's thread."""
+        """Answer it with ``why`` now, unless it was given up before. Called by the executor's thread."""
         if self.given_up is None:
             self.given_up = ended, why
             self.cancellation.cancel()
@@ -66,12 +66,11 @@ class Ticket:
 
 
 class DetectJobs:
-    """Answers ``detect_jobs`` requests at a time; ``detect_waiting`` more may wait, the rest is refused.
+    """Computes ``detect_jobs`` requests at a time; ``detect_waiting`` more may wait, others are rejected.
 
-    A request that is not answered when its time limit has passed, when it is given up, or when this is closed, is told
-    so and its computation ended; the place that it holds is free once that ends.
-    scene: what the node knows, asked in the executor at each request; a text instead: why it cannot answer
-    now.
+    If the time limit of a request has passed, if it is given up, or if this is closed, the request is answered with the
+    reason and its computation is cancelled; its place is free when that ends.
+    scene: the state of the node, requested in the executor for each request; or a text: why it cannot answer now.
     """
 
     def __init__(
@@ -96,30 +95,30 @@ class DetectJobs:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How requests ended, and how many hold a place now."""
+        """How requests ended, and how many are computed or queued now."""
         return {**self._ended, "open": self._open}
 
     def count(self, ended: str) -> None:
-        """A request that ended so, without having come to `answer`."""
+        """Count a request that ended this way before it reached `answer`."""
         self._ended[ended] += 1
 
     def forget_scenes(self, unused_for: float) -> None:
-        """Give back what is held for further requests about scenes that nobody asked about for so many seconds."""
+        """Release scenes kept for further requests that were not used for this number of seconds."""
         self._kept.forget(unused_for)
 
     def places(self) -> dict[Ticket, int]:
-        """Of those that wait: how many wait in front of them."""
+        """Queue position of each waiting request."""
         with self._lock:
             return {ticket: place for place, ticket in enumerate(self._waiting)}
 
     def close(self) -> None:
-        """Nobody's answer is awaited any longer; `answer` goes on, with a refusal, when its task is run next."""
+        """Give up all requests; `answer` continues, with a rejection, when its task runs next."""
         for ticket in tuple(self._awaited):
             ticket.give_up("stopped", STOPPED)
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     async def answer(self, request: Request, response: R, ticket: Ticket) -> R:
-        """`response` with the answer; where there is none, with the reason. ``ticket.ended`` tells which it is."""
+        """Fill `response` with the result or with the reason why there is none; see ``ticket.ended``."""
         try:
             return await self._computed(request, response, ticket)
         except RequestError as error:

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a request to ``~/detect`` brings, be it of the service or of the action: meshes, topologies and positions,
-checked; then its query is answered."""
+"""Check meshes, topologies and positions of a request to ``~/detect`` (service or action) and compute its query."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -32,7 +31,7 @@ from hpccd_ros.node.detect_query import (
 
 @dataclass(frozen=True)
 class NodeScene:
-    """What the node itself knows at the time of a request: its meshes and the topologies in force."""
+    """The state of the node at the time of a request: its meshes and their current topologies."""
 
     builder: SceneBuilder
     topologies: dict[str, Topology | None]

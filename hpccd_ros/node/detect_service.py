@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Service ``~/detect``: snapshots in, contacts, a step or distances out."""
+"""Service ``~/detect``: positions in, contacts, a step size or distances out."""
 
 import math
 import time
@@ -14,18 +14,18 @@ from hpccd_ros.node.detect_jobs import STOPPED, DetectJobs, Ticket
 from hpccd_ros.node.detect_query import WAITING
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 
-# Requests that may lie in the queue of the service beside those that find a place: a burst of them is answered "busy"
-# rather than lost. Bounds what strangers can make the node hold.
+# Queue of the service for requests beyond the accepted ones: a burst is answered with "busy" and not lost. Bounds the
+# memory that untrusted clients can use.
 ROOM_TO_REFUSE = 1000
-# s for telling those whose requests nobody has looked at yet that the service ends.
+# s for answering requests that were not processed before the service ends.
 FAREWELL = 0.5
-# s that the service outlives its last answer: DDS tells a client of the end by another way, which on a busy machine
-# overtook 4 of 610 answers, and a reader takes nothing of a writer that is gone.
+# s that the service exists after its last answer: DDS announces its end on another channel, which overtook 4 of 610
+# answers on a busy machine, and a reader takes nothing from a writer that is gone.
 DELIVERY = 0.2
 
 
 class DetectService:
-    """Each request gets the answer of ``jobs``."""
+    """Answers each request with the result of ``jobs``."""
 
     def __init__(self, node: GuardedLifecycleNode, jobs: DetectJobs, settings: dict[str, Any]) -> None:
         self._node = node
@@ -55,7 +55,7 @@ class DetectService:
             self._introspection = wanted
 
     def close(self) -> None:
-        """Answer whoever still waits, then end. In the thread of the executor, whose next turn comes too late; behind
+        """Answer waiting requests, then end. In the thread of the executor, whose next turn comes too late; after
         ``jobs.close()``.
         """
         executor = self._node.executor
@@ -68,7 +68,7 @@ class DetectService:
         self._node.destroy_service(self._service)
 
     def _turn_away(self) -> None:
-        """Answer the requests that came and were not looked at yet."""
+        """Answer requests that were received but not processed."""
         deadline = time.monotonic() + FAREWELL  # an answer to a client that is gone takes 0.1 s
         with self._service.handle:
             while time.monotonic() < deadline:

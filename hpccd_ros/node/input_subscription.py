@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A subscription of the node, warnings about publishers that DDS does not connect to it because they offer less than it
-requests, and the hand-over of frames to the detection thread."""
+"""A subscription of the node, warnings about publishers with incompatible QoS, and the hand-over of frames to the
+detection thread."""
 
 import time
 from collections import Counter
@@ -17,7 +17,7 @@ from hpccd_ros.frames.types import Outcome
 from hpccd_ros.middleware import qos_overrides
 from hpccd_ros.node.accounts import Accounts
 
-# Bounds the publishers reported for one topic at a time: anybody may start some.
+# Bounds the publishers reported for one topic at a time: any process may start some.
 MOST_REPORTED = 3
 
 
@@ -69,7 +69,7 @@ class InputSubscription:
 
     @property
     def publishers(self) -> int:
-        """As far as is known."""
+        """Known publishers of the topic."""
         return self._node.count_publishers(self.topic)
 
     def close(self) -> None:
@@ -130,9 +130,9 @@ _YIELD = 2e-5  # s; what counts is that it is not 0
 
 
 def hand_over(outcome: Outcome, pipeline: FramePipeline, accounts: Accounts) -> None:
-    """What came of a message enters the books; then the detection thread is let in where there is a frame for it.
+    """Count the outcome of a message; then let the detection thread run if there is a frame for it.
 
-    In this order: the answer to a frame tells how many were dropped before it.
+    In this order: the result of a frame states how many were dropped before it.
     """
     accounts.add(outcome)
     for frame in outcome.frames:

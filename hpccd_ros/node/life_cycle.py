@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""rclpy's life-cycle node, with what it lacks: invalid transitions are refused, errors of transitions are told, and
-what `on_configure` makes can be undone."""
+"""rclpy's life-cycle node with additions: invalid transitions are rejected, errors of transitions are reported, and the
+resources that `on_configure` creates are released by `unconfigure`."""
 
 import contextlib
 from collections.abc import Callable
@@ -19,7 +19,7 @@ Transition = Callable[[LifecycleState], TransitionCallbackReturn]
 
 
 class GuardedLifecycleNode(LifecycleNode):
-    """errors: what this node's callbacks raised that nothing expected; for the node's executor too."""
+    """errors: unexpected exceptions of this node's callbacks; the node's executor uses it too."""
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
@@ -35,18 +35,18 @@ class GuardedLifecycleNode(LifecycleNode):
         return self._state_machine.current_state[1]
 
     def configured_publisher(self, kind: type, topic: str, profile: QoSProfile) -> Publisher:
-        """Until `unconfigure`."""
+        """A publisher until `unconfigure`."""
         publisher = qos_overrides.create_publisher(self, kind, topic, profile)
         self._configured.callback(self.destroy_publisher, publisher)
         return publisher
 
     def configured_timer(self, period: float, callback: Callable[[], None]) -> None:
-        """Until `unconfigure`. In steady time: it goes on while simulated time stands still."""
+        """A timer until `unconfigure`. In steady time: it runs while simulated time stands still."""
         timer = self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._configured.callback(self.destroy_timer, timer)
 
     def when_unconfigured(self, callback: Callable[[], None]) -> None:
-        """Call it once at the next `unconfigure`, before what was made earlier is destroyed."""
+        """Call it once at the next `unconfigure`, before resources that were created earlier are destroyed."""
         self._configured.callback(callback)
 
     def unconfigure(self) -> None:

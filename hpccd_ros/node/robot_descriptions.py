@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The robots of a configured node: those of files at once, those of topics when their description has come."""
+"""The robots of a configured node: from files at once, from topics when their description has arrived."""
 
 import time
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from hpccd_ros.params.values import ParameterError
 from hpccd_ros.robots.errors import RobotError, SemanticsError
 from hpccd_ros.robots.robot import Robot
 
-# s without reading descriptions after some were read: that takes up to seconds, and anybody may publish them.
+# s without parsing descriptions after some were parsed: parsing takes up to seconds, and any process may publish them.
 PERIOD = 1.0
 LOOK = 0.25  # s between two looks at those that came too soon
 LONGEST = 500
@@ -68,7 +68,7 @@ class RobotDescriptions:
         return newer | {name: f"its description was rejected: {why}" for name, why in self._refused.items()}
 
     def warnings(self) -> list[str]:
-        """Which robots are not known, and which descriptions cannot be used."""
+        """Robots that are not known, and descriptions that are invalid."""
         waiting = [
             f"robot {name} waits for its description on {self._node.resolve_topic_name(topic)}{self._why(topic)}"
             for name, topic in self._topics.items()
@@ -142,7 +142,7 @@ class RobotDescriptions:
             self._read = time.monotonic()
 
     def _was_read(self, name: str) -> bool:
-        """Of a robot that waits for its first description the scene waits as well."""
+        """Whether the first description of the robot was parsed: the scene waits for it."""
         return name in self._texts or name in self._refused
 
     def _take(self, name: str, text: str) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The node in its process: started from the arguments, run until it is told to end."""
+"""The process of the node: start it from the arguments, run it until SIGINT or SIGTERM."""
 
 import gc
 import sys
@@ -16,14 +16,14 @@ from hpccd_ros.params.values import ParameterError
 
 
 class _Executor(UnreadableExecutor, GuardedExecutor, LeanExecutor):
-    """No callback ends the node, no message is lost without a word, and few turns are made in between."""
+    """No callback ends the node, lost messages are reported, and few turns are made in between."""
 
 
 def main(argv: list[str] | None = None, node_type: type[HpccdNode] = HpccdNode) -> int:
     """Run the node until SIGINT or SIGTERM; node_type: a class built on HpccdNode, to look into it.
 
-    Returns the exit status: 0 ended as told, 1 could not be configured, 2 wrong parameters or arguments, 3 DDS security
-    is demanded and cannot be had.
+    Returns the exit status: 0 ended by a signal, 1 could not be configured, 2 invalid parameters or arguments, 3 DDS
+    security is required and not available.
     """
     stop = Future()
     stop_signals.watch(lambda: stop.set_result(None))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From steps, refusals and failures to the topic stop, which is published by a thread that does nothing else: neither
-the executor nor a detection can hold it up."""
+"""From steps, rejections and failures to the topic stop. A thread of its own publishes it, so neither the executor nor
+a detection can delay it."""
 
 import threading
 import time
@@ -31,9 +31,9 @@ LOG_PERIOD = 1.0  # s
 
 
 class StopSignal:
-    """Says what ``state`` says, at once and again and again, until it is closed: then true for the last time.
+    """Publishes ``state`` at once and periodically until it is closed, then true a last time.
 
-    Of a configured ``node``; ended where that is unconfigured.
+    Belongs to a configured ``node``; ends when that is unconfigured.
     """
 
     def __init__(self, node: GuardedLifecycleNode, state: StopState, timeout: float) -> None:
@@ -47,7 +47,7 @@ class StopSignal:
         node.when_unconfigured(self.close)
 
     def close(self) -> None:
-        """Needs no valid context; what was closed may be closed again."""
+        """Needs no valid context; may be called again."""
         if self._state.closed:
             return
         self._state.close()
@@ -109,13 +109,13 @@ class StopWatch:
         self._state.begin(WatchedScene.of(builder, settings, links))
 
     def end(self) -> None:
-        """Before the detection thread is joined: a step that is looked at is given up."""
+        """Called before the detection thread is joined: a running distance query is cancelled."""
         self._state.end()
         if self._nearness is not None:
             self._nearness.cancel()
 
     def close(self) -> None:
-        """A last true; then nothing any more."""
+        """Publish true a last time; nothing afterwards."""
         self._signal.close()
 
     def apply_change(self) -> None:
@@ -129,8 +129,8 @@ class StopWatch:
         self._state.first()
 
     def look(self, start: SceneFrame, end: SceneFrame) -> None:
-        """Before the contacts of the step, so that stop rises before they are found. One that cannot be looked at makes
-        stop true, and contacts are looked for all the same."""
+        """Query the distances of a step before its contacts, so that stop rises before they are found. If the query
+        fails, stop becomes true, and contacts are computed all the same."""
         began = time.perf_counter()
         try:
             near, distance = self._nearness.within(start, end)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From the topics of the meshes to detections: subscriptions, pipeline and detection thread, wired together."""
+"""From the topics of the meshes to detections: connects subscriptions, pipeline and detection thread."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -31,7 +31,7 @@ from hpccd_ros.robots.joint_frames import JointFrames
 
 
 class StreamDetection:
-    """Made when a node with meshes or robots is configured; works between ``open`` and ``close``.
+    """Created when a node with meshes or robots is configured; active between ``open`` and ``close``.
 
     Raises MeshFileError, and ValueError for a scene that cannot move.
     """
@@ -60,8 +60,8 @@ class StreamDetection:
         self._subscriptions.open(self._pipeline, self._by_joints, self._accounts)
 
     def remake(self, builder: SceneBuilder) -> None:
-        """The scene is that of the robots which are known now. What was given once stays, topologies, static positions,
-        shapes, transforms, and frames of meshes that wait for others; those of robots are asked for anew."""
+        """Build the scene with the robots that are known now. Topologies, static positions, shapes, transforms and
+        frames of meshes that wait for others stay; those of robots are requested again."""
         works = self._thread is not None
         if works and self._stop is not None:
             self._stop.end()
@@ -103,7 +103,8 @@ class StreamDetection:
         self._thread = thread
 
     def close(self) -> None:
-        """Unsubscribe and end the thread; what waited is counted as stopped. Topologies and static positions stay."""
+        """Unsubscribe and end the thread; waiting frames are counted as stopped. Topologies and static positions
+        stay."""
         self._subscriptions.close()
         self._accounts.inputs.add(taken_inputs.STOPPED, 0)
         self._accounts.add(self._pipeline.stop())
@@ -116,7 +117,7 @@ class StreamDetection:
             self._thread = None
 
     def apply_change(self) -> None:
-        """Follow the parameters, of which some may change at any time."""
+        """Apply changed parameters."""
         count = self._configuration.settings["restart_after"]
         if count != self._restart_after:
             self._accounts.inputs.add(taken_inputs.RESTART_AFTER, count)
@@ -126,24 +127,24 @@ class StreamDetection:
             self._thread.detector.options = self._configuration.options
 
     def works(self) -> bool:
-        """Whether the detection thread has a frame now; from any thread."""
+        """Whether the detection thread processes a frame now; from any thread."""
         thread = self._thread
         return thread is not None and thread.working_on is not None
 
     @property
     def waiting(self) -> int:
-        """Messages received that are neither answered nor dropped yet."""
+        """Received messages that are neither processed nor dropped yet."""
         waiting = self._pipeline.waiting  # before the thread is looked at: it takes over what leaves the queue
         worked_on = self._thread.working_on if self._thread is not None else None
         return waiting + (len(worked_on.fresh) if worked_on is not None else 0)
 
     @property
     def coordinate_frame(self) -> tuple[str, str]:
-        """(frame_id of the scene or "", where it comes from)."""
+        """(frame_id of the scene or "", its origin)."""
         return self._pipeline.coordinate_frame
 
     def topologies(self) -> dict[str, Topology | None]:
-        """Mesh name -> the one in force, in the order of the scene."""
+        """Mesh name -> its current topology, in the order of the scene."""
         return {mesh.name: self._pipeline.topology(mesh.name) for mesh in self._builder.meshes}
 
     def warnings(self) -> list[str]:
@@ -173,7 +174,7 @@ class StreamDetection:
 
 
 class Subscriptions:
-    """Nothing is subscribed before ``open``; ``close`` ends what is, should ``open`` have failed half-way too.
+    """Nothing is subscribed before ``open``; ``close`` ends all subscriptions, even after ``open`` failed half-way.
 
     meshes: mesh name -> parameters mesh.NAME.*.
     """
@@ -198,7 +199,7 @@ class Subscriptions:
             self._of_meshes.append(MeshSubscriptions(reception, mesh["input"]))
 
     def use(self, pipeline: FramePipeline, by_joints: Mapping[str, JointFrames]) -> None:
-        """What comes goes there from now on."""
+        """Send messages to this pipeline from now on."""
         for part in (*self._of_meshes, *self._of_others):
             part.use(pipeline, by_joints)
 

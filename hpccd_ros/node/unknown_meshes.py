@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notice frames of meshes that the node was not told of: usually a misspelt name, else silently unheard."""
+"""Notice frames of meshes that the node does not have: usually a misspelt name, which nothing else would report."""
 
 from typing import Any
 
@@ -20,9 +20,9 @@ from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.middleware import message_types, qos, topic_names
 from hpccd_ros.node.accounts import Accounts
 
-# Bounds what strangers can make the node subscribe to, at a time.
+# Bounds the subscriptions that untrusted publishers can cause at a time.
 _MOST_TOPICS = 16
-# Bounds the names that strangers can make it keep in its counters.
+# Bounds the names that untrusted publishers can add to its counters.
 _MOST_NAMES = 64
 _OTHERS = "(others)"
 _TYPES = {
