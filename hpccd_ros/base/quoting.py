@@ -3,7 +3,7 @@
 
 import difflib
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 # Of one value: a path of usual length is shown whole.
 LONGEST = 200
@@ -39,10 +39,15 @@ def repeated(names: Iterable[str]) -> str:
     return quoted(Counter(names).most_common(1)[0][0])
 
 
-def suggestion(word: str, names: Iterable[str]) -> str:
-    """ "; did you mean NAME?" with the name nearest to ``word``; "": none is near."""
-    near = difflib.get_close_matches(word, list(names), n=1)
+def suggestion(word: str, names: Iterable[str], similarity: float = 0.6) -> str:
+    """ "; did you mean NAME?" with the name nearest to ``word``; "": none has this similarity (difflib, 0 .. 1)."""
+    near = len(word) <= LONGEST and difflib.get_close_matches(word, list(names), n=1, cutoff=similarity)
     return f"; did you mean {near[0]}?" if near else ""
+
+
+def not_one_of(value: object, choices: Sequence[str]) -> str:
+    """That ``value`` is not one of the allowed texts, and which those are."""
+    return f"{quoted(value)} is not valid; use one of {', '.join(choices)}{suggestion(str(value), choices)}"
 
 
 def counted(count: int, one: str, many: str = "") -> str:

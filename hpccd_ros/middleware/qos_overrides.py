@@ -16,7 +16,7 @@ from rclpy.qos import QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 
-from hpccd_ros.base.quoting import quoted, shortened
+from hpccd_ros.base.quoting import not_one_of, shortened
 from hpccd_ros.middleware import topic_names
 
 PREFIX = "qos_overrides."
@@ -60,9 +60,9 @@ def unusable_override(node: Node) -> str | None:
     for name, parameter in _given(node).items():
         policy, value = name.rpartition(".")[2], parameter.value
         if policy == "depth" and not (type(value) is int and 1 <= value <= DEEPEST):
-            return f"{shortened(name)}: {shortened(value)} is no whole number of 1 .. {DEEPEST:,}"
+            return f"{shortened(name)}: {shortened(value)} is not valid; use a whole number of 1 .. {DEEPEST:,}"
         if policy in _CHOICES and value not in _CHOICES[policy]:
-            return f"{shortened(name)}: {quoted(value)} is none of {', '.join(_CHOICES[policy])}"
+            return f"{shortened(name)}: {not_one_of(value, _CHOICES[policy])}"
     return None
 
 

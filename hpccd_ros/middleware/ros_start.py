@@ -57,7 +57,7 @@ def refuse_other_arguments(arguments: list[str] | None = None) -> None:
     if others := remove_ros_args(arguments)[1:]:
         raise UserError(
             f"unknown arguments {listed(others)}: ROS arguments come after --ros-args, for example "
-            "--ros-args --params-file config/hpccd.yaml"
+            "--ros-args --params-file config/hpccd.yaml; --help shows more"
         )
 
 
@@ -79,7 +79,8 @@ def start_failure(error: Exception) -> tuple[int, str] | None:
     if type(error).__name__ not in _OF_RCL:
         return None
     if type(error).__name__ == "UnknownROSArgsError":
-        return WRONG_PARAMETERS, f"unknown ROS arguments {_sentence(error)}: leave them out, or see `ros2 run --help`"
+        remedy = "leave them out, or write --params-file FILE, -p NAME:=VALUE or -r FROM:=TO"
+        return WRONG_PARAMETERS, f"unknown ROS arguments {_sentence(error)}: {remedy}"
     text = _sentence(error)
     remedy = next((f"; {remedy}" for part, remedy in _REMEDIES.items() if part in text), "")
     wrong = text.startswith(("failed to initialize", "error creating node: invalid node"))

@@ -12,7 +12,7 @@ from hpccd_ros.detect.core import unusable_options
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.middleware import environment, message_types, qos_overrides, topic_names, transform_topics
 from hpccd_ros.node.node_recording import unrecordable
-from hpccd_ros.params import parameters, robot_parameters, scene_parameters
+from hpccd_ros.params import parameters, robot_parameters, scene_parameters, unknown
 from hpccd_ros.params.robot_parameters import NO_ROBOTS, Robots
 from hpccd_ros.params.table import ROBOT
 from hpccd_ros.params.values import ParameterError
@@ -35,9 +35,9 @@ class Configuration:
         topics = topic_names.subscribed(self.meshes, robot_parameters.subscribed(self.settings[ROBOT]))
         if why := self._unusable_topics(self.settings, self.meshes) or qos_overrides.unusable_override(node):
             raise ParameterError(why)
-        for name in parameters.unknown_overrides(node, qos_overrides.known(node, topics)):
-            text = f"parameter {shortened(name)} is unknown and has no effect; see docs/parameters.md"
-            node.get_logger().warning(text)
+        not_ours = parameters.unknown_overrides(node, qos_overrides.known(node, topics))
+        for name in unknown.check(not_ours, self.settings):
+            node.get_logger().warning(unknown.warning(name))
         self.robots: Robots = NO_ROBOTS
         self.options = scene_parameters.detector_options(self.settings)
         if why := unusable_options(self.options) or unrecordable(self.settings):

@@ -12,7 +12,7 @@ from hpccd.srv import Detect
 
 import hpccd_core as hc
 from hpccd_core import arguments
-from hpccd_ros.base.quoting import quoted, shortened
+from hpccd_ros.base.quoting import not_one_of, shortened
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NONE, Separation
@@ -59,7 +59,7 @@ def requested_query(request: Request) -> Query:
     """Raises RequestError: no such query, or an argument that it has no use for."""
     name = request.query or "contacts"
     if name not in ANSWERS:
-        raise RequestError(f"query: {quoted(name)} is none of {', '.join(ANSWERS)}")
+        raise RequestError(f"query: {not_one_of(name, list(ANSWERS))}")
     separation = _length(request, "minimum_separation", name, of=OF_MOTION)
     distance = _length(request, "distance", name, of=("proximity",))
     if name != "contacts" and request.report not in ("", "all"):

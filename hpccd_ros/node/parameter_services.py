@@ -54,7 +54,7 @@ def _refusal(node: Node, given: Parameter) -> SetParametersResult | None:
     if given.value.type not in TYPES:
         reason = f"{given.name}: {given.value.type} is no type of rcl_interfaces/msg/ParameterType"
     elif not node.has_parameter(given.name):
-        reason = values.undeclared(given.name)
+        reason = values.undeclared(given.name, node.list_parameters([], 0).names)
     else:
         return None
     return SetParametersResult(successful=False, reason=reason)

@@ -22,8 +22,10 @@ hpccd_node --ros-args --params-file my.yaml
 ```
 
 `-p accuracy:=balanced` on the command line sets one parameter. [Profiles](node.md#profiles) are parameter files for
-common purposes. With an invalid value the node does not start (exit status 2) and prints the reason.
-An unknown name is warned of.
+common purposes. The node does not start (exit status 2) with an invalid value, or with an unknown name that resembles
+one of these or begins with `mesh.`, `robot.`, `pairs.` or `stop`; it prints the reason and the nearest name. Any other
+unknown name is taken for a parameter of another node: it has no effect, and the log has a warning. In a file for
+several nodes, write the parameters of each under the name of the node, not under `/**`.
 
 **When a parameter can change:**
 

@@ -104,7 +104,7 @@ def _declare_one(node: Node, row: Row, name: str) -> Any:
 
 
 def unknown_overrides(node: Node, qos_overrides: Container[str] = ()) -> list[str]:
-    """Parameters given on the command line or in a file that the node does not have: usually misspelt.
+    """Parameters given on the command line or in a file that the node does not have.
 
     qos_overrides: names of those that are declared only when their topics are there.
     """

@@ -25,7 +25,7 @@ def unusable_value(row: Row, value: Any) -> str | None:
     if row.choices:
         for entry in entries:
             if entry not in row.choices and entry != row.default:
-                return f"{row.name}: {quoting.quoted(entry)} is none of {', '.join(row.choices)}"
+                return f"{row.name}: {quoting.not_one_of(entry, row.choices)}"
     return None
 
 
@@ -133,7 +133,7 @@ def pair_names(given: Iterable[str]) -> list[str]:
         if not pair or key not in keys:
             raise ParameterError(
                 f"{quoting.shortened(name)}: no parameter of a pair of meshes; there are {PAIRS}.NAME.KEY with a NAME "
-                f"without dots and a KEY out of {', '.join(keys)}"
+                f"without dots and a KEY out of {', '.join(keys)}{quoting.suggestion(key, keys)}"
             )
         found.add(pair)
     return sorted(found)
@@ -149,8 +149,8 @@ def robot_rows(robot: str) -> list[tuple[Row, str]]:
     return [(row, f"{ROBOT}.{robot}.{row.name}") for row in ROBOT_ROWS]
 
 
-def undeclared(name: str) -> str:
-    """Why a parameter that a running node does not have cannot be set."""
+def undeclared(name: str, known: Iterable[str]) -> str:
+    """Why a parameter that a running node does not have cannot be set. known: those that it has."""
     try:
         pairs = pair_names([name])
     except ParameterError as error:
@@ -161,7 +161,8 @@ def undeclared(name: str) -> str:
             f"start it with {quoting.shortened(f'{PAIRS}.{pairs[0]}.meshes')}, or name both meshes in pair_separation, "
             "pair_accuracy, pair_features or ignored_pairs"
         )
-    return f"{quoting.shortened(name)}: the node has no such parameter; see docs/parameters.md"
+    near = quoting.suggestion(name, known)
+    return f"{quoting.shortened(name)}: the node has no such parameter; docs/parameters.md lists all{near}"
 
 
 # Of every node.

@@ -15,7 +15,7 @@ from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.rigid_mesh import mesh_of_file
 from hpccd_ros.frames.types import MeshFrame, Topology
 from hpccd_ros.middleware import resources, topic_names, transform_topics
-from hpccd_ros.params import pair_parameters, robot_parameters, scene_parameters, values
+from hpccd_ros.params import pair_parameters, robot_parameters, scene_parameters, unknown, values
 from hpccd_ros.params.parameter_file import read_parameters
 from hpccd_ros.params.table import ROBOT
 from hpccd_ros.params.values import ParameterError
@@ -83,6 +83,9 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         if not settings["robots"] and all(row["static"] for row in meshes.values()):
             raise ParameterError("at least one mesh must not be static, or nothing ever moves")
         scene_parameters.check(settings, meshes)
+        without_effect = values.unknown(given, meshes, settings["robots"])
+        if parameter_file:  # what is stored may be of another version
+            without_effect = unknown.check(without_effect, settings)
     except ParameterError as error:
         raise refused(printable(f"{where}: {error}")) from error
     of_robots = settings[ROBOT]
@@ -126,7 +129,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         _files(recording, meshes),
         robots,
         [by_role[role] for role in dict.fromkeys(described)],
-        values.unknown(given, meshes, settings["robots"]),
+        without_effect,
     )
 
 

@@ -16,6 +16,7 @@ from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.frames.drops import Reason
+from hpccd_ros.params import unknown
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.pacing import Pace, next_wanted
 from hpccd_ros.replay.recomputed import Replay, ReplayedStep
@@ -151,7 +152,7 @@ def main(args) -> int:
     for note in recording.notes:
         print(note, file=sys.stderr)
     for name in setup.unknown:
-        print(f"parameter {name} is unknown and has no effect", file=sys.stderr)
+        print(unknown.warning(name), file=sys.stderr)
     summary.print(args, recording, replay)
     failed = any(part.diverged or part.unverified for part in (replay, replay.distances))
     return 1 if failed or not summary.computed else 0

@@ -116,13 +116,13 @@ def test_after_a_clean_up_what_is_not_overridden_follows_its_parameter(start_nod
 @pytest.mark.parametrize(
     "policy, value, text",
     [
-        ("depth", 0, "0 is no whole number of 1 .. 100,000"),
-        ("depth", 2**40, "is no whole number"),
-        ("depth", "deep", "deep is no whole number"),
-        ("depth", True, "True is no whole number"),
-        ("reliability", "unknown", "'unknown' is none of reliable, best_effort"),
-        ("reliability", 5, "5 is none of reliable"),
-        ("history", "keep_some", "'keep_some' is none of keep_last, keep_all"),
+        ("depth", 0, "0 is not valid; use a whole number of 1 .. 100,000"),
+        ("depth", 2**40, "is not valid; use a whole number"),
+        ("depth", "deep", "deep is not valid; use a whole number"),
+        ("depth", True, "True is not valid; use a whole number"),
+        ("reliability", "unknown", "'unknown' is not valid; use one of reliable, best_effort"),
+        ("reliability", 5, "5 is not valid; use one of reliable"),
+        ("history", "keep_some", "'keep_some' is not valid; use one of keep_last, keep_all"),
     ],
 )
 def test_nonsense_is_refused(start_node, policy, value, text):

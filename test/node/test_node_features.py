@@ -67,7 +67,7 @@ def test_changed_from_step_to_step_recorded_and_verified(start_node, tmp_path, h
         stream.expect(features)
     status = stream.node.peer.statuses["detection"][2]
     assert status["features"] == "vertex_face, edge_edge"
-    for bad, reason in (([""], "features: empty"), (["faces"], "none of vertex_face, edge_edge"), ("x", "type")):
+    for bad, reason in (([""], "features: empty"), (["faces"], "use one of vertex_face, edge_edge"), ("x", "type")):
         answer = stream.set("features", bad)
         assert not answer.successful and reason in answer.reason, answer.reason
     answer = stream.set("pair_features", ["cloth:net:vertex_face"])

@@ -162,7 +162,10 @@ NAN_VERTEX.start[1].vertices_f64[4] = math.nan
         (changed(distance=[0.1]), "distance: only query proximity has one, leave it empty for collision_free_step"),
         (changed(minimum_separation=[math.nan]), "minimum_separation: nan must be finite and not negative"),
         (changed(minimum_separation=[-1.0]), "minimum_separation: -1.0 must be finite and not negative"),
-        (changed(query="collision_free_steps"), "query: 'collision_free_steps' is none of contacts, collision_free"),
+        (
+            changed(query="collision_free_steps"),
+            "query: 'collision_free_steps' is not valid; use one of contacts, collision_free",
+        ),
         (changed(accuracy="sloppy"), "accuracy"),
         (changed(time_limit=math.inf), "time_limit: inf must be positive and finite"),
         (changed(start=[]), "start: 0 entries for 2 meshes (lower, upper)"),

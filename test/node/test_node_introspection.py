@@ -51,7 +51,7 @@ def test_events_of_the_service(start_node):
     assert list(asked.mesh_names) == ["hand", "table"] and len(asked.end) == 2
     assert answered.contacts == answer.contacts and answered.contacts.total > 0
     refused = set_parameter(node, "service_introspection", "some")
-    assert not refused.successful and "'some' is none of off, metadata, contents" in refused.reason
+    assert not refused.successful and "'some' is not valid; use one of off, metadata, contents" in refused.reason
     assert set_parameter(node, "service_introspection", "off").successful
     ask(node, service)
     assert set_parameter(node, "service_introspection", "metadata").successful

@@ -48,7 +48,9 @@ def test_volatile_is_the_default_and_a_clean_up_takes_what_is_set(start_node):
     assert not refused.successful and "read-only while the node is configured" in refused.reason
     assert change_state(node, Transition.TRANSITION_DEACTIVATE) and change_state(node, Transition.TRANSITION_CLEANUP)
     refused = set_parameter(node, "contacts_durability", "persistent")
-    assert not refused.successful and "'persistent' is none of volatile, transient_local" in refused.reason
+    assert (
+        not refused.successful and "'persistent' is not valid; use one of volatile, transient_local" in refused.reason
+    )
     assert set_parameter(node, "contacts_durability", "transient_local").successful
     assert change_state(node, Transition.TRANSITION_CONFIGURE) and change_state(node, Transition.TRANSITION_ACTIVATE)
     name = f"{node.namespace}/contacts"

@@ -97,7 +97,7 @@ def test_nothing_of_dds_outlives_the_node(start_node, tmp_path):
 @pytest.mark.parametrize(
     "parameters, status, text",
     [
-        ({"meshes": ["cloth"], "accuracy": "sloppy"}, 2, "accuracy: 'sloppy' is none of"),
+        ({"meshes": ["cloth"], "accuracy": "sloppy"}, 2, "accuracy: 'sloppy' is not valid; use one of"),
         ({"meshes": ["cloth"], "threads": -1}, 2, "threads"),
         ({"meshes": ["cloth"], "threads": "all"}, 2, "threads"),
         ({"meshes": ["a/b"]}, 2, "'a/b' cannot be part of a topic name"),
@@ -122,9 +122,9 @@ def test_start_that_cannot_work_says_why(start_node, parameters, status, text):
     assert text in node.output() and "Traceback" not in node.output()
 
 
-def test_misspelt_parameter_is_told(start_node):
-    node = start_node({"meshes": ["cloth"], "acuracy": "balanced"})
-    assert "parameter acuracy is unknown" in node.output()
+def test_a_parameter_of_another_node_is_warned_of(start_node):
+    node = start_node({"meshes": ["cloth"], "other_node_gain": 0.5})
+    assert "parameter other_node_gain is unknown and has no effect" in node.output()
 
 
 def test_life_cycle(start_node):
@@ -307,7 +307,7 @@ def test_options_change_at_run_time(start_node):
     assert_same_contacts(message, sheet_positions(N, 1), sheet_positions(N, 2), scene, report="first")
     assert len(message.normals) == 3 * len(message.toc) and len(message.points) == 0
     for name, value, reason in [
-        ("accuracy", "sloppy", "is none of"),
+        ("accuracy", "sloppy", "is not valid; use one of"),
         ("frame_queue", 7, "read-only"),
         ("max_contacts", -1, "range"),
         ("threads", "four", "type"),

@@ -64,7 +64,11 @@ def test_given_changed_and_replayed(start_node, tmp_path, hpccd):
         ("pairs.new.separation", 1e-3, "start it with pairs.new.meshes, or name both meshes in pair_separation"),
         ("pairs.new.meshes", ["cloth", "net"], "pairs.new.meshes: the node has no pair of this name"),
         ("pairs.between.acuracy", "fast", "pairs.between.acuracy: no parameter of a pair of meshes; there are"),
-        ("mesh.nte.frame", "hand", "mesh.nte.frame: the node has no such parameter; see docs/parameters.md"),
+        (
+            "mesh.nte.frame",
+            "hand",
+            "mesh.nte.frame: the node has no such parameter; docs/parameters.md lists all; did you mean mesh.net.fr",
+        ),
     ):
         refused = set_parameter(node, name, value)
         assert not refused.successful and reason in refused.reason, refused.reason

@@ -151,7 +151,10 @@ def test_meshes_that_intersect_and_meshes_far_apart(node):
 @pytest.mark.parametrize(
     "asked, text",
     [
-        (request(query="nearest"), "query: 'nearest' is none of contacts, collision_free_step, proximity, inters"),
+        (
+            request(query="nearest"),
+            "query: 'nearest' is not valid; use one of contacts, collision_free_step, proximity, inters",
+        ),
         (snapshot("proximity"), "distance: empty; query proximity needs one"),
         (snapshot("proximity", distance=[-1.0]), "distance: -1.0 must be finite and not negative"),
         (snapshot("proximity", distance=[math.nan]), "distance: nan must be finite"),

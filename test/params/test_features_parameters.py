@@ -35,7 +35,7 @@ def test_what_the_core_is_told():
     [
         ({"features": []}, "features: empty, so nothing would be tested; name vertex_face or edge_edge, or both"),
         ({"features": [""]}, "are named by ignored_pairs"),
-        ({"features": ["faces"]}, "features: 'faces' is none of vertex_face, edge_edge"),
+        ({"features": ["faces"]}, "features: 'faces' is not valid; use one of vertex_face, edge_edge"),
         ({"features": "vertex_face"}, "features: 'vertex_face' is of the wrong type; expected string[]"),
         ({"pair_features": ["robot:cloth"]}, "pair_features: 'robot:cloth' must be NAME:NAME:KIND with"),
         ({"pair_features": ["robot:cloth:edges"]}, "and a kind out of vertex_face, edge_edge"),

@@ -77,8 +77,12 @@ PAIR = {"a.meshes": ["robot", "cloth"]}
         ({"a": 3}, {}, "pairs.a: no parameter of a pair of meshes"),
         (PAIR | {"a.separation": "wide"}, {}, "pairs.a.separation: 'wide' is of the wrong type; expected float"),
         (PAIR | {"a.separation": -1.0}, {}, "pairs.a.separation: -1.0 is outside 0.0 .. 1e+150"),
-        (PAIR | {"a.accuracy": "best"}, {}, "pairs.a.accuracy: 'best' is none of fast, balanced"),
-        (PAIR | {"a.features": ["faces"]}, {}, "pairs.a.features: 'faces' is none of vertex_face, edge_edge"),
+        (PAIR | {"a.accuracy": "best"}, {}, "pairs.a.accuracy: 'best' is not valid; use one of fast, balanced"),
+        (
+            PAIR | {"a.features": ["faces"]},
+            {},
+            "pairs.a.features: 'faces' is not valid; use one of vertex_face, edge_edge",
+        ),
         (PAIR | {"a.ignored": "yes"}, {}, "pairs.a.ignored: 'yes' is of the wrong type; expected bool"),
         (
             {"a.meshes": ["cloth", "cloth"], "a.ignored": True},

@@ -87,8 +87,8 @@ def test_overrides_reach_the_settings(node_with):
             },
             "give mesh.a.pose",
         ),
-        ({"accuracy": "sloppy"}, "accuracy: 'sloppy' is none of fast, balanced"),
-        ({"outputs": ["points", "colours"]}, "outputs: 'colours' is none of"),
+        ({"accuracy": "sloppy"}, "accuracy: 'sloppy' is not valid; use one of fast, balanced"),
+        ({"outputs": ["points", "colours"]}, "outputs: 'colours' is not valid; use one of"),
         ({"threads": -1}, "threads"),
         ({"record_split_size": 1e-6}, "record_split_size: 1e-06 is neither 0 nor at least 0.01"),
         ({"record_split_time": 1e-9}, "record_split_time: 1e-09 is neither 0 nor at least 0.1"),
@@ -98,7 +98,10 @@ def test_overrides_reach_the_settings(node_with):
         ({"stamp_tolerance": [1]}, "stamp_tolerance"),
         ({"meshes": ["a"], "mesh__a__pose": ["0", "1"]}, "mesh.a.pose: "),
         ({"meshes": ["a"], "mesh__a__pose": 1}, "mesh.a.pose: "),
-        ({"meshes": ["a"], "mesh__a__input": "clouds"}, "mesh.a.input: 'clouds' is none of vertices, points"),
+        (
+            {"meshes": ["a"], "mesh__a__input": "clouds"},
+            "mesh.a.input: 'clouds' is not valid; use one of vertices, points",
+        ),
     ],
 )
 def test_bad_values_are_named(node_with, overrides, text):
@@ -149,7 +152,7 @@ def test_changes_at_run_time(node_with):
     assert change("outputs", [""]).successful and settings["outputs"] == []
     refusals = {
         "accuracy": ("fast", "fast is not built"),
-        "report": ("some", "report: 'some' is none of"),
+        "report": ("some", "report: 'some' is not valid; use one of"),
         "frame_queue": (4, "frame_queue: read-only while the node is configured; deactivate and clean up first"),
         "mesh.a.static": (True, "mesh.a.static: read-only while"),
         "meshes": (["b"], "read-only"),
@@ -165,7 +168,7 @@ def test_changes_at_run_time(node_with):
     assert change("frame_queue", 4).successful and settings["frame_queue"] == 4
     assert change("mesh.a.static", True).successful and meshes["a"]["static"]
     result = change("mesh.a.input", "clouds")
-    assert not result.successful and "mesh.a.input: 'clouds' is none of" in result.reason
+    assert not result.successful and "mesh.a.input: 'clouds' is not valid; use one of" in result.reason
     assert not change("meshes", ["b"]).successful
 
 

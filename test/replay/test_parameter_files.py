@@ -41,7 +41,7 @@ def foreign(small_bag, tmp_path):
         (NODE + "    threads: many\n", "threads: 'many' is of the wrong type; expected int"),
         (NODE + "    threads: 5000\n", "threads: 5000 is outside 0 .. 1024"),
         (NODE + "    stamp_tolerance: fast\n", "stamp_tolerance: 'fast' is of the wrong type; expected float"),
-        (NODE + "    report: some\n", "report: 'some' is none of all, first, any"),
+        (NODE + "    report: some\n", "report: 'some' is not valid; use one of all, first, any"),
         (NODE + "    ignored_pairs: [cloth:shirt]\n", "ignored_pairs: 'cloth:shirt' must be"),
         (NODE + "    mesh: {ball: {static: 1}}\n", "mesh.ball.static: 1 is of the wrong type; expected bool"),
         (NODE + "    mesh: {ball: {pose: [0.0, 1.0]}}\n", "mesh.ball.pose: "),
@@ -80,4 +80,12 @@ def test_numbers_and_unknown_names_are_taken_as_the_node_takes_them(foreign, tmp
     path.write_text(NODE + "    stamp_tolerance: 1e-3\n    mesh: {ball: {self_collision: false}}\n    tresholds: 5\n")
     done = hpccd("replay", foreign, "--params", path)
     assert done.status == 0 and "VERIFIED: 89" in done.out, done
-    assert done.err == "parameter tresholds is unknown and has no effect\n"
+    assert done.err == "parameter tresholds is unknown and has no effect; docs/parameters.md lists all\n"
+
+
+def test_a_misspelt_name_in_the_file_is_refused_as_the_node_refuses_it(foreign, tmp_path):
+    path = tmp_path / "node.yaml"
+    path.write_text(NODE + "    minimum_seperation: 0.1\n")
+    done = hpccd("replay", foreign, "--params", path)
+    assert done.status == 2 and "minimum_seperation: no such parameter; " in done.err
+    assert done.err.endswith("did you mean minimum_separation?\n")
