@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From frames of the scene to contacts: the core's scene, its detector, the thread that runs it. No ROS."""
+"""Computes contacts from frames of the scene: the core's scene, its detector, the thread that runs it. No ROS."""

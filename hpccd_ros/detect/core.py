@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The core's detector: its options, what it cannot work with, and how another thread ends it. No ROS."""
+"""The core's detector: its options, which of them are unusable, and cancellation from another thread. No ROS."""
 
 import threading
 from dataclasses import dataclass, replace
@@ -15,7 +15,8 @@ from hpccd_ros.frames.types import Topology
 
 
 class Cancellation:
-    """`guard` each detector before it works; `cancel` makes the last ones, and all later ones, raise hc.Cancelled."""
+    """Call `guard` with each detector before it works; `cancel` makes the guarded ones, and all later ones, raise
+    hc.Cancelled."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -23,7 +24,7 @@ class Cancellation:
         self._cancelled = False
 
     def guard(self, detector: hc.Detector, *others: hc.Detector) -> hc.Detector:
-        """`detector`; from now on it and the others are what `cancel` ends."""
+        """Guard `detector`: from now on `cancel` ends it and the ``others``."""
         with self._lock:
             self._detectors = (detector, *others)
             if self._cancelled:
@@ -31,7 +32,7 @@ class Cancellation:
         return detector
 
     def cancel(self) -> None:
-        """From any thread; for good."""
+        """Cancel all guarded detectors, and later ones too. May be called from any thread."""
         with self._lock:
             self._cancelled = True
             self._cancel_all()
@@ -41,25 +42,22 @@ class Cancellation:
             detector.cancel()
 
     def release(self) -> bool:
-        """Whether the guarded detector may go on to other work: `cancel` came too late for it, and no longer ends it.
-
-        False: it is ended.
-        """
+        """Stop guarding the detector, so that it may do other work. False: it was cancelled."""
         with self._lock:
             if not self._cancelled:
                 self._detectors = ()
             return not self._cancelled
 
 
-# What the core raises for bad input, options that are not built, and lack of memory or of a device.
+# Errors of the core for invalid input, options that are not built, and lack of memory or of a device.
 CORE_ERRORS = (ValueError, TypeError, RuntimeError, MemoryError)
 
 
 @dataclass(frozen=True)
 class Options:
-    """Arguments of hpccd_core.Detector, and what may change without another one: the separation of pairs of meshes, and
-    whether the smallest ``distances`` at the end of a step are computed too, and how steps with meshes that move by
-    poses are cut.
+    """Arguments of hpccd_core.Detector, and settings that may change without a new detector: the separation of pairs of
+    meshes, whether the smallest ``distances`` at the end of a step are computed too, and how steps with meshes that
+    move by poses are cut.
     """
 
     accuracy: str = "exact"
@@ -73,7 +71,7 @@ class Options:
     rigid: RigidOptions = RigidOptions()
 
     def same_detector(self, other: "Options") -> bool:
-        """Whether a detector made with one may go on with the other."""
+        """Whether a detector made with one may continue with the other."""
         return replace(self, **_CHANGEABLE) == replace(other, **_CHANGEABLE)
 
 
@@ -81,7 +79,7 @@ _CHANGEABLE: dict[str, Any] = {"separation": NONE, "distances": False, "rigid": 
 
 
 def make_detector(scene: hc.Scene, options: Options) -> hc.Detector:
-    """Detector with these options. Raises what the core raises."""
+    """A detector with these options. Raises the core's errors."""
     detector = hc.Detector(
         scene,
         accuracy=options.accuracy,
@@ -98,7 +96,7 @@ def make_detector(scene: hc.Scene, options: Options) -> hc.Detector:
 
 
 def unusable_options(options: Options) -> str | None:
-    """Why the core cannot work with these options on this machine, or None."""
+    """Why the core cannot use these options on this machine, or None."""
     scene = hc.Scene()
     names = {name for entry in options.separation.pairs for name in entry[:2]}
     for name in sorted(names) or ["probe"]:
@@ -111,7 +109,7 @@ def unusable_options(options: Options) -> str | None:
 
 
 def unusable_topology(topology: Topology) -> str | None:
-    """Why the core cannot take this topology, or None."""
+    """Why the core cannot use this topology, or None."""
     try:
         hc.Scene().add_mesh("mesh", topology.faces, edges=topology.edges, n_vertices=topology.n_vertices)
     except CORE_ERRORS as error:

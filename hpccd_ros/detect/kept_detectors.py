@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Detectors that wait for the next request about the same scene. No ROS.
+"""Detectors kept for the next request about the same scene. No ROS.
 
-Who asks how far a step may go asks again and again about one scene: to build that scene costs more than the answer.
+Solvers send many requests about one scene, and building the scene costs more than the computation.
 """
 
 import threading
@@ -16,7 +16,7 @@ from hpccd_ros.frames.types import Topology
 
 @dataclass(frozen=True, eq=False)
 class DetectorOf:
-    """A detector and all that it was made of."""
+    """A detector, its scene and its options."""
 
     builder: SceneBuilder
     topologies: tuple[Topology, ...]
@@ -24,7 +24,7 @@ class DetectorOf:
     detector: hc.Detector
 
     def fits(self, builder: SceneBuilder, topologies: tuple[Topology, ...], options: Options) -> bool:
-        """Whether one made of these would give the same answers. Versions of topologies are not the detector's."""
+        """Whether a detector made of these would give the same results. Topology versions do not matter."""
         return (
             self.options == options
             and self.builder == builder
@@ -33,15 +33,15 @@ class DetectorOf:
 
 
 class KeptDetectors:
-    """At most ``most`` that nobody uses; the one unused for the longest time gives way. For several threads."""
+    """At most ``most`` unused detectors; the one unused for the longest time is discarded. Thread-safe."""
 
     def __init__(self, most: int) -> None:
         self._most = most
         self._lock = threading.Lock()
-        self._unused: list[tuple[float, DetectorOf]] = []  # since when (time.monotonic()), in this order
+        self._unused: list[tuple[float, DetectorOf]] = []  # unused since (time.monotonic()), in this order
 
     def take(self, builder: SceneBuilder, topologies: tuple[Topology, ...], options: Options) -> DetectorOf | None:
-        """One that fits, from now on the caller's alone; None where none is there."""
+        """Remove and return one that fits; None if there is none."""
         with self._lock:
             for place in reversed(range(len(self._unused))):
                 if self._unused[place][1].fits(builder, topologies, options):
@@ -49,12 +49,12 @@ class KeptDetectors:
         return None
 
     def keep(self, used: DetectorOf) -> None:
-        """Leave one for later requests."""
+        """Keep one for later requests."""
         with self._lock:
             self._unused = [*self._unused, (time.monotonic(), used)][-self._most :]
 
     def forget(self, unused_for: float) -> None:
-        """Give back the memory of those that nobody used for so many seconds."""
+        """Discard those that were unused for this number of seconds."""
         before = time.monotonic() - unused_for
         with self._lock:
             self._unused = [entry for entry in self._unused if entry[0] > before]

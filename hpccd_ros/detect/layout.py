@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The core numbers features across the scene, messages within a mesh: how one becomes the other."""
+"""Converts between scene-wide indices of the core and indices within a mesh, as in messages."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from hpccd_ros.frames.types import Topology
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Where each mesh lies in the scene-wide numbering of the core.
+    """Position of each mesh in the scene-wide numbering of the core.
 
     ``vertex_offsets``, ``face_offsets``: (K+1,) int64, the last entry is the total. ``topology_versions``: one for each
     mesh; empty: not known.
@@ -26,7 +26,7 @@ class Layout:
     def of(cls, mesh_names: tuple[str, ...], topologies: tuple[Topology, ...]) -> "Layout":
         """Meshes concatenated in the order given, as hpccd_core.Scene does.
 
-        Raises ValueError where there are not as many topologies as names.
+        Raises ValueError if the numbers of topologies and names differ.
         """
         if len(mesh_names) != len(topologies):
             raise ValueError(f"topologies: {len(topologies)} of {len(mesh_names)} meshes; give one for each name")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether different meshes come near each other on a step: yes or no. No ROS, no threads of its own."""
+"""Whether different meshes come within a distance during a step. No ROS, no threads."""
 
 from dataclasses import replace
 
@@ -12,34 +12,34 @@ from hpccd_ros.frames.types import SceneFrame
 
 
 class Nearness:
-    """Asks for any one pair of features that comes within a distance at some time of the step, its end included: exact,
-    whatever the tier of the contacts, and of whole surfaces, whatever features are tested. So nothing is listed, and
-    nothing compared; what is only passed through counts too. A scene and a detector of its own: pairs within a mesh,
-    whose neighbouring features are as near as its edges are short, must not count here.
+    """Searches for any one pair of features within a distance at some time of the step, its end included. It is exact,
+    whatever the tier of the contacts, and about whole surfaces, whatever features are tested. Passing through counts
+    too. It has its own scene and detector, because pairs within a mesh must not count here: neighbouring features are
+    as close as its edges are short.
     """
 
     def __init__(self, builder: SceneBuilder, options: Options, distance: float) -> None:
         self._detector = StepDetector(builder.between_meshes, _asking(options, distance))
         self._static = [number for number, mesh in enumerate(builder.meshes) if mesh.static]
-        self._apart: SceneFrame | None = None  # no edge pierces a face there
+        self._apart: SceneFrame | None = None  # no edge intersects a face there
 
     def set(self, options: Options, distance: float) -> None:
-        """From any thread: the next step has it."""
+        """Set the distance of the next step. May be called from any thread."""
         self._detector.options = _asking(options, distance)
 
     def cancel(self) -> None:
-        """From any thread, for good: `within` raises hc.Cancelled."""
+        """Permanently: `within` raises hc.Cancelled. May be called from any thread."""
         self._detector.cancel()
 
     def within(self, start: SceneFrame, end: SceneFrame) -> tuple[bool, float]:
-        """(whether a pair came within the distance, that distance). Raises what the core raises."""
-        # What is called static may have been put elsewhere, by no motion.
+        """(whether a pair came within the distance, that distance). Raises the core's errors."""
+        # A static mesh may have been placed elsewhere, without a motion.
         stays = all(start.vertices[mesh] is end.vertices[mesh] for mesh in self._static)
         apart, self._apart = stays and self._apart is start, None
         found = self._detector.detect(start, end)
         near = len(found.contacts) > 0
-        # An edge in the middle of a large face may be far from its border and corners: such meshes are 0 apart, and no
-        # pair of features is near. They get there only by a contact. So it is asked where a step does not begin apart.
+        # An edge through the middle of a large face may be far from its border and corners: the meshes intersect, and
+        # no pair of features is within the distance. They get there only by a contact, so starts are tested.
         if not near and not apart:
             near = self._detector.intersect(end)
         if not near:

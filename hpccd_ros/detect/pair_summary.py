@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pairs of meshes in brief: contacts and smallest distance of each on a step, and how fast they approach. No ROS."""
+"""Summaries of pairs of meshes: contacts and smallest distance of each in a step, and approach speeds. No ROS."""
 
 import math
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ class PairSummary:
 
 
 def summarise(found: Detection) -> list[PairSummary]:
-    """One for each pair that the step's scene tests, of all contacts that were found."""
+    """One for each pair that the scene of the step tests, about all contacts found."""
     names = found.layout.mesh_names
     counts, earliest = _by_pair(found)
     index = {name: number for number, name in enumerate(names)}
@@ -42,7 +42,7 @@ def summarise(found: Detection) -> list[PairSummary]:
 
 
 def _by_pair(found: Detection) -> tuple[np.ndarray, np.ndarray]:
-    """(K, K): how many contacts of the meshes i <= j there are, and the earliest time of them."""
+    """(K, K): number of contacts of the meshes i <= j, and their earliest time."""
     contacts, vertices, faces = found.contacts, found.layout.vertex_offsets, found.layout.face_offsets
     meshes = len(found.layout.mesh_names)
     counts, earliest = np.zeros(meshes * meshes, np.int64), np.full(meshes * meshes, math.inf)
@@ -62,26 +62,26 @@ def _mesh_of(indices: np.ndarray, offsets: np.ndarray) -> np.ndarray:
 
 
 def directions(gaps: Sequence[hc.Gap]) -> NDArray[np.float64]:
-    """(P, 3): unit vector from the first of the nearest points to the second; 0 where there is none."""
+    """(P, 3): unit vector from the first nearest point to the second; 0 if there is none."""
     found = np.zeros((len(gaps), 3))
     for row, gap in enumerate(gaps):
         if not gap.kind or gap.distance == 0:
             continue
-        # Halved, as points of opposite signs may be farther apart than numbers go.
+        # Halved, because the difference of points of opposite signs may overflow.
         along = gap.points[1] / 2 - gap.points[0] / 2
-        if largest := np.abs(along).max():  # points that are told apart by less than their rounding have no direction
+        if largest := np.abs(along).max():  # points that differ by less than their rounding have no direction
             along = along / largest  # squares neither overflow nor vanish
             found[row] = along / np.linalg.norm(along)
     return found
 
 
 def approach_speeds(before: Sequence[hc.Gap] | None, now: Sequence[hc.Gap], seconds: float) -> NDArray[np.float64]:
-    """(P,): how much smaller the distances have become in a second; > 0: nearing. NaN where it is not known.
+    """(P,): decrease of the distances per second; > 0: approaching. NaN: unknown.
 
-    before: of the same pairs of meshes, so many ``seconds`` ago; None: not known.
+    before: gaps of the same pairs of meshes, ``seconds`` ago; None: unknown.
 
-    Distances are compared, not the velocities of the nearest points: which points are nearest changes from one
-    snapshot to the next, and where it does their velocities say nothing of the distance.
+    Distances are compared, not the velocities of the nearest points: other points may be nearest in the next
+    snapshot, and then their velocities are unrelated to the distance.
     """
     if before is None or len(before) != len(now) or not seconds > 0:
         return np.full(len(now), np.nan)

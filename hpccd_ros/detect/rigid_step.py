@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A step in which meshes move by poses or joints: the core knows straight lines only. No ROS.
+"""A step in which meshes move by poses or joints, while the core has straight lines only. No ROS.
 
-rigid/__init__.py says how such a step is asked, and why nothing is missed. Pairs of meshes that both go straight are
-asked in a detector of their own, once for the whole step: cloth with itself need not pay for what a robot's turns cost.
+hpccd_core/rigid/__init__.py describes how such a step is computed, and why there are no false negatives. Pairs of
+meshes that both move straight have a separate detector, which computes the whole step at once: cloth with itself does
+not have the overhead of a robot's rotations.
 """
 
 from collections import Counter
@@ -22,15 +23,15 @@ from hpccd_ros.detect.separation import MotionBounds, Separation
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.robots.placement import LinkMotions
 
-# Of detector.stats: what calls do not add up.
+# Entries of detector.stats that are not summed over calls.
 OF_THE_SCENE = ("triangles", "bytes")
 
 
 @dataclass(frozen=True)
 class RigidOptions:
-    """``tolerance``: the straight lines of a part of a step shall be no farther than this from the motion of poses, in
-    the unit of the scene. ``most_parts``: a step is cut into no more. ``parts``: into just so many, whatever the
-    tolerance; 0: as few as it asks for."""
+    """``tolerance``: largest deviation of the straight lines of a part from the motion of poses, in the unit of the
+    scene. ``most_parts``: largest number of parts of a step. ``parts``: exact number, whatever the tolerance; 0: as few
+    as it requires."""
 
     tolerance: float = 1e-3
     most_parts: int = 64
@@ -40,7 +41,7 @@ class RigidOptions:
 def motions(
     parts: tuple[Sequence[np.ndarray], Sequence[np.ndarray]], start: SceneFrame, end: SceneFrame
 ) -> list[Motion]:
-    """Of each mesh; ``parts``: its vertices at both ends. One whose shape was given anew in between goes straight."""
+    """The motion of each mesh; ``parts``: its vertices at both ends. A mesh with a new shape moves straight."""
     found: list[Motion] = []
     links = LinkMotions()
     for v0, v1, p0, p1 in zip(*parts, start.placements, end.placements, strict=True):
@@ -54,8 +55,8 @@ def motions(
 
 
 class RigidStep:
-    """Asks two detectors about one step. bent: of the pairs of meshes of which one moves by poses; straight: of the
-    others, None where there are none. names: of all meshes.
+    """Computes one step with two detectors. bent: for pairs of meshes of which one moves by poses; straight: for the
+    others, None if there are none. names: of all meshes.
     """
 
     def __init__(self, names: tuple[str, ...], bent: hc.Detector, straight: hc.Detector | None) -> None:
@@ -64,13 +65,13 @@ class RigidStep:
         self.detectors = (bent,) if straight is None else (bent, straight)
         self.profile: Counter[str] = Counter()  # ms of the last step, by stage
         self.stats: Counter[str] = Counter()  # of the last step
-        self._last_end: tuple[list[np.ndarray], np.ndarray] = ([], np.empty((0, 3)))  # of each mesh, and of all
+        self._last_end: tuple[list[np.ndarray], np.ndarray] = ([], np.empty((0, 3)))  # for each mesh, and for all
 
     def detect(
         self, moving: Sequence[Motion], asked: Separation, options: RigidOptions, report: str
     ) -> tuple[hc.Contacts, MotionBounds]:
-        """moving: of each mesh. asked: what is in force for the detector of straight pairs already. Raises what the
-        core raises."""
+        """moving: the motion of each mesh. asked: the separation that the detector of straight pairs already has.
+        Raises the core's errors."""
         self.profile.clear()
         self.stats.clear()
         parts = options.parts or cuts.fewest_parts(moving, options.tolerance, options.most_parts).parts
@@ -92,7 +93,7 @@ class RigidStep:
         return contacts, bounds
 
     def _at_cut(self, moving: Sequence[Motion], number: int, parts: int) -> np.ndarray:
-        """(V,3). Where a step goes on from the one before, its start is the end of that one."""
+        """(V,3). If a step continues the previous one, its start is the end of that one."""
         of_meshes = [motion.vertices(number, parts) for motion in moving]
         last, positions = self._last_end
         if number != 0 or len(last) != len(of_meshes) or any(map(is_not, last, of_meshes)):

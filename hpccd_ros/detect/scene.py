@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The core's scene of the meshes, whatever their topologies are at the time. No ROS."""
+"""The core's scene of the meshes with their current topologies. No ROS."""
 
 from collections import defaultdict
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from hpccd_ros.frames.types import MeshSettings, SceneFrame, Topology
 
 @dataclass(frozen=True)
 class SceneBuilder:
-    """Makes core scenes of the same meshes with changing topologies; equal builders make equal scenes of them."""
+    """Makes core scenes of the same meshes with changing topologies; equal builders make equal scenes."""
 
     meshes: tuple[MeshSettings, ...]
     ignored_pairs: tuple[tuple[str, str], ...] = ()
@@ -21,7 +21,7 @@ class SceneBuilder:
     pair_features: tuple[tuple[str, str, tuple[str, ...]], ...] = ()
 
     def build(self, topologies: tuple[Topology, ...]) -> hc.Scene:
-        """One topology for each mesh, in order. Raises what the core raises."""
+        """One topology for each mesh, in order. Raises the core's errors."""
         scene = hc.Scene()
         for mesh, topology in zip(self.meshes, topologies, strict=True):
             scene.add_mesh(
@@ -42,8 +42,8 @@ class SceneBuilder:
 
     @cached_property
     def tested_pairs(self) -> tuple[tuple[str, str], ...]:
-        """Names of the meshes that are tested against each other, and of those within themselves twice; in the order of
-        the scene."""
+        """Names of the pairs of meshes that are tested, the same name twice for within a mesh, in the order of the
+        scene."""
         ignored: dict[str, set[str]] = defaultdict(set)
         for a, b in self.ignored_pairs:
             ignored[a].add(b)
@@ -52,7 +52,7 @@ class SceneBuilder:
         for number, mesh in enumerate(self.meshes):
             if mesh.self_collision and not mesh.static:
                 found.append((mesh.name, mesh.name))
-            left_out = ignored[mesh.name]  # looked up once: a robot of a thousand links has half a million pairs
+            left_out = ignored[mesh.name]  # looked up once: a robot with a thousand links has half a million pairs
             found += [
                 (mesh.name, other.name)
                 for other in self.meshes[number + 1 :]
@@ -66,11 +66,11 @@ class SceneBuilder:
         return tuple(mesh.rigid for mesh in self.meshes)
 
     def of_rigid_pairs(self) -> "SceneBuilder":
-        """Nothing is tested but pairs of meshes of which one moves by poses, or both do."""
+        """A builder that tests only pairs of meshes of which at least one moves by poses."""
         return self._restricted(of_rigid=True)
 
     def of_other_pairs(self) -> "SceneBuilder | None":
-        """Nothing is tested but the other pairs; None where there are none."""
+        """A builder that tests only the other pairs; None if there are none."""
         left = self._restricted(of_rigid=False)
         return left if left.tested_pairs else None
 
@@ -84,7 +84,7 @@ class SceneBuilder:
         return replace(self, meshes=meshes, ignored_pairs=self.ignored_pairs + ignored)
 
     def among(self, names: list[str]) -> "SceneBuilder":
-        """The scene of these meshes, in this order; names that it does not have are meshes of their own."""
+        """The builder for these meshes, in this order; unknown names are meshes with default settings."""
         known, wanted = {mesh.name: mesh for mesh in self.meshes}, set(names)
         return SceneBuilder(
             tuple(known.get(name, MeshSettings(name)) for name in names),
@@ -95,12 +95,12 @@ class SceneBuilder:
 
     @property
     def between_meshes(self) -> "SceneBuilder":
-        """Pairs of different meshes alone, each tested in whole."""
+        """A builder for pairs of different meshes only, with all features."""
         return SceneBuilder(tuple(replace(mesh, self_collision=False) for mesh in self.meshes), self.ignored_pairs)
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
-        """Different meshes that are tested against each other."""
+        """Pairs of different meshes that are tested."""
         return [(a, b) for a, b in self.tested_pairs if a != b]
 
     def parts(self, frame: SceneFrame, static_of: SceneFrame) -> list[np.ndarray]:

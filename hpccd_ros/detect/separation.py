@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far apart the meshes of a scene are to stay, and how far each may be from its motion. No ROS."""
+"""Separations of the meshes of a scene, and deviation bounds of their motion. No ROS."""
 
 import math
 from collections.abc import Collection
@@ -14,8 +14,8 @@ from hpccd_ros.detect.layout import Layout
 
 @dataclass(frozen=True)
 class Separation:
-    """``minimum``: of the whole scene, 0 for contacts that touch. ``pairs``: (mesh, mesh, distance), which hold instead
-    for these two meshes; the same name twice: within the mesh. In the unit of the scene.
+    """``minimum``: for the whole scene; 0: features must touch. ``pairs``: (mesh, mesh, distance) for pairs with
+    another separation; the same name twice: within the mesh. In the unit of the scene.
     """
 
     minimum: float = 0.0
@@ -23,18 +23,18 @@ class Separation:
 
     @property
     def text(self) -> str:
-        """In words, each distance in as many digits as tell it from all others; empty where contacts touch."""
+        """In words, each distance with the digits that distinguish it from all others; empty if features must touch."""
         if self == Separation():
             return ""
         return ", ".join([_number(self.minimum), *(f"{a}:{b}:{_number(distance)}" for a, b, distance in self.pairs)])
 
     def among(self, names: Collection[str]) -> "Separation":
-        """That of the scene of these meshes."""
+        """The separation for a scene of these meshes."""
         kept = tuple(entry for entry in self.pairs if entry[0] in names and entry[1] in names)
         return Separation(self.minimum, kept)
 
     def table(self, names: tuple[str, ...]) -> NDArray[np.float64]:
-        """(K, K): the distance in force for each pair of the K meshes."""
+        """(K, K): the separation of each pair of the K meshes."""
         index = {name: number for number, name in enumerate(names)}
         values = np.full((len(names), len(names)), float(self.minimum))
         for mesh_a, mesh_b, distance in self.pairs:
@@ -43,7 +43,7 @@ class Separation:
         return values
 
     def unusable(self) -> str | None:
-        """Why no scene can have it, or None."""
+        """Why it is invalid, or None."""
         for what, distance in [("", self.minimum), *((f"{a}:{b}: ", d) for a, b, d in self.pairs)]:
             if not (math.isfinite(distance) and distance >= 0):
                 return f"{what}a separation must be finite and not negative, not {distance}"
@@ -55,13 +55,13 @@ def _number(distance: float) -> str:
     return short if float(short) == distance else repr(float(distance))
 
 
-#: Contacts touch.
+#: Features must touch.
 NONE = Separation()
 
 
 @dataclass(frozen=True)
 class MotionBounds:
-    """``parts``: into how many the step was cut. ``of_meshes``: how far each mesh may have been from its motion."""
+    """``parts``: number of parts of the step. ``of_meshes``: deviation bound of each mesh."""
 
     parts: int = 0
     of_meshes: tuple[float, ...] = ()
@@ -72,15 +72,15 @@ NO_BOUNDS = MotionBounds()
 
 
 def change_separation(detector: hc.Detector, names: tuple[str, ...], old: Separation, new: Separation) -> None:
-    """From the next call of ``detector`` on ``new`` holds instead of ``old``; nothing of its scene is built anew."""
+    """From the next call of ``detector`` on, use ``new`` instead of ``old``; its scene is not rebuilt."""
     before, after = old.table(names), new.table(names)
     for a, b in np.argwhere(np.triu(before != after)).tolist():
         detector.set_separation(names[a], names[b], float(after[a, b]))
 
 
 def count_near(contacts: hc.Contacts, layout: Layout, separation: Separation) -> int:
-    """How many of the contacts are of meshes that have a separation: they came near, whether they touch or not."""
-    if not separation.pairs:  # what is so at nearly all times costs nothing
+    """Number of contacts of meshes with a separation, whether they touch or not."""
+    if not separation.pairs:  # the usual case costs nothing
         return len(contacts) if separation.minimum > 0 else 0
     apart = separation.table(layout.mesh_names) > 0
     of_vertices, of_faces = layout.vertex_offsets, layout.face_offsets

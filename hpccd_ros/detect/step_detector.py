@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From the two frames of a step to its contacts. No ROS, no threads of its own."""
+"""Computes the contacts of a step from its two frames. No ROS, no threads."""
 
 import time
 from collections.abc import Sequence
@@ -18,10 +18,10 @@ from hpccd_ros.frames.types import SceneFrame
 class Detection:
     """The contacts of one step and how they were found.
 
-    ``backend``, ``threads``: what was used. ``detect_ms``: wall time of the core's call. ``gaps``: the smallest
-    distance of each pair of meshes at the end, where the options ask for it; ``gaps_backend``: what found them, which
-    may be another one; ``gaps_before``: those at the start, where they were asked for then. ``bounds``: of motions by
-    poses or joints. ``tested_pairs``: of the scene, as SceneBuilder has them.
+    ``backend``, ``threads``: those used. ``detect_ms``: wall time of the core's call. ``gaps``: the smallest distance
+    of each pair of meshes at the end, if the options request it; ``gaps_backend``: the backend that computed them,
+    which may differ; ``gaps_before``: those at the start, if they were requested then. ``bounds``: of motions by poses
+    or joints. ``tested_pairs``: of the scene, as in SceneBuilder.
     """
 
     start: SceneFrame
@@ -42,14 +42,14 @@ class Detection:
 
     @property
     def near(self) -> int:
-        """How many of the contacts are of meshes that have a separation."""
+        """Number of contacts of meshes with a separation."""
         return count_near(self.contacts, self.layout, self.options.separation)
 
 
 class StepDetector:
-    """Keeps the core's scene and detector from step to step, as long as topologies and ``options`` stay the same.
+    """Keeps the core's scene and detector from step to step while topologies and ``options`` stay the same.
 
-    ``options`` may be set at any time, from any thread: the next step has them.
+    ``options`` may be set at any time, from any thread, and apply to the next step.
     """
 
     def __init__(self, builder: SceneBuilder, options: Options) -> None:
@@ -61,7 +61,7 @@ class StepDetector:
         self._layout: Layout | None = None
         self._detector: hc.Detector | None = None
         self._detector_options: Options | None = None
-        self._rigid_step: RigidStep | None = None  # where meshes move by poses; then the detector finds distances only
+        self._rigid_step: RigidStep | None = None  # if meshes move by poses; then the detector computes distances only
         self._cancellation = Cancellation()
         self._last_gaps: tuple[SceneFrame, list[hc.Gap]] | None = None
 
@@ -71,18 +71,18 @@ class StepDetector:
         return self._names
 
     def cancel(self) -> None:
-        """From any thread, for good: the detection under way, and all later ones, raise hc.Cancelled."""
+        """Permanently: the current detection, and all later ones, raise hc.Cancelled. May be called from any thread."""
         self._cancellation.cancel()
 
     def prepare_scene(self, frame: SceneFrame) -> None:
-        """The scene of the topologies of ``frame``. Raises what the core raises."""
+        """Make the scene for the topologies of ``frame``. Raises the core's errors."""
         if self._scene_of is None or not self._scene_of.same_scene(frame):
             self._scene = self._builder.build(frame.topologies)
             self._layout = Layout.of(self._names, frame.topologies)
             self._scene_of, self._detector = frame, None
 
     def prepare_detector(self) -> None:
-        """The detector of the scene, with the options of now. Raises what the core raises."""
+        """Make the detector of the scene with the current options. Raises the core's errors."""
         options = self.options
         if self._detector is None or not options.same_detector(self._detector_options):
             detector = make_detector(self._scene, options)
@@ -90,7 +90,7 @@ class StepDetector:
             others = self._rigid_step.detectors if self._rigid_step is not None else ()
             self._detector = self._cancellation.guard(detector, *others)
         elif options.separation != (before := self._detector_options.separation):
-            detector, self._detector = self._detector, None  # none where only a part of the change is made
+            detector, self._detector = self._detector, None  # none if only a part of the change is made
             change_separation(detector, self._names, before, options.separation)
             if self._rigid_step is not None and self._rigid_step.straight is not None:
                 change_separation(self._rigid_step.straight, self._names, before, options.separation)
@@ -109,19 +109,19 @@ class StepDetector:
         )
 
     def distances(self, frame: SceneFrame) -> list[hc.Gap]:
-        """The smallest distance of each pair of meshes in ``frame``. Raises what the core raises."""
+        """The smallest distance of each pair of meshes in ``frame``. Raises the core's errors."""
         self.prepare_scene(frame)
         self.prepare_detector()
         return self._detector.distances(self._builder.concatenate(frame, frame))
 
     def intersect(self, frame: SceneFrame) -> bool:
-        """Whether an edge pierces or touches a face in ``frame``. Raises what the core raises."""
+        """Whether an edge intersects or touches a face in ``frame``. Raises the core's errors."""
         self.prepare_scene(frame)
         self.prepare_detector()
         return len(self._detector.intersections(self._builder.concatenate(frame, frame))) > 0
 
     def detect(self, start: SceneFrame, end: SceneFrame) -> Detection:
-        """The contacts on the way from ``start`` to ``end``, of the same scene. Raises what the core raises."""
+        """The contacts of the motion from ``start`` to ``end``, of the same scene. Raises the core's errors."""
         self.prepare_scene(end)
         self.prepare_detector()
         found = self._detect(start, end) if self._rigid_step is None else self._detect_rigid(start, end)
@@ -148,7 +148,7 @@ class StepDetector:
         return self._detection(start, end, contacts, began, step.bent, step.profile, step.stats, bounds)
 
     def _detection(self, start, end, contacts, began, detector, profile, stats, bounds=NO_BOUNDS) -> Detection:
-        """detector: of those asked the one whose backend and threads are told."""
+        """detector: the one whose backend and threads are reported."""
         detect_ms = 1e3 * (time.perf_counter() - began)
         return Detection(
             start,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The thread that detects, outside of the executor. No ROS."""
+"""The detection thread, outside of the executor. No ROS."""
 
 import threading
 from collections.abc import Callable
@@ -10,13 +10,12 @@ from hpccd_ros.frames.types import SceneFrame
 
 
 class DetectionThread(threading.Thread):
-    """Pops scene frames from ``queue``, hands detections to ``on_detection``, until the queue is closed.
+    """Takes scene frames from ``queue`` and passes detections to ``on_detection``, until the queue is closed.
 
-    The motion goes from the end of the last step that was answered to the new frame, so where frames were dropped
-    between them, or their detection failed, no time is left unwatched. The first frame, and the first after a change
-    of topology, is only a start: ``on_first``. ``on_step`` has both frames of each step before it is detected.
-    ``on_failure`` has the frames that were not answered, and why:
-    hc.Cancelled after `cancel`.
+    A step goes from the end of the last successful step to the new frame, so dropped frames and failed detections
+    leave no gap in time. The first frame, and the first after a change of topology, is only a start: ``on_first``.
+    ``on_step`` receives both frames of each step before its detection, ``on_failure`` the frames without a result, and
+    the error: hc.Cancelled after `cancel`.
     """
 
     def __init__(
@@ -40,7 +39,7 @@ class DetectionThread(threading.Thread):
         self.working_on: SceneFrame | None = None
 
     def cancel(self) -> None:
-        """Give up the frame that is worked on. For the end, after the queue was closed."""
+        """Cancel the current detection. Call it at the end, after the queue was closed."""
         self.detector.cancel()
 
     def run(self) -> None:
@@ -53,7 +52,7 @@ class DetectionThread(threading.Thread):
                 else:
                     self._on_step(self._start, frame)
                     self._on_detection(self.detector.detect(self._start, frame))
-                    self._start = frame  # only now: a step that failed is part of the next one
-            except Exception as error:  # any: else it would end this thread, and no frame be answered again
+                    self._start = frame  # only now, because a failed step is part of the next one
+            except Exception as error:  # any: it would end this thread and all later results
                 self._on_failure(frame, error)
             self.working_on = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How messages arrive: how often, and by the publishers' sequence numbers, what was lost and who is new. No ROS."""
+"""Rate limits, and lost messages and new publishers found by sequence numbers. No ROS."""
 
 import time
 from collections.abc import Callable
@@ -31,11 +31,11 @@ class RateLimit:
 class SequenceWatch:
     """Follows the publication sequence numbers that come with the messages of one topic.
 
-    A reader's history that is overwritten before the node gets to it is no "lost message" to DDS: only the
-    gap in these numbers shows it.
+    DDS does not report messages that are overwritten in the reader's history as lost: only a gap in these numbers
+    shows them.
 
-    ``before_first``: messages that publishers numbered before the first one that was read here: written
-    before this reader was known to them, or lost; the numbers cannot tell.
+    ``before_first``: messages with smaller numbers than the first one read here. They were written before the
+    publisher knew this reader, or lost.
     """
 
     def __init__(self) -> None:
@@ -54,7 +54,7 @@ class SequenceWatch:
     def next(self, number: int) -> tuple[int, bool]:
         """(messages missing before this one, whether it is the first of another publisher).
 
-        A number that does not grow means another publisher, which counts from the start.
+        A number that does not increase means another publisher, which counts from the start.
         """
         last, self._last = self._last, number
         first, self._seen_any = not self._seen_any, True
@@ -65,16 +65,16 @@ class SequenceWatch:
         return 0 if last is None or new_publisher else number - last - 1, new_publisher
 
     def notice(self) -> bool:
-        """Whether there was a new publisher since this was asked last: its first message may have been refused, and the
-        next one stands for it."""
+        """Whether there was a new publisher since the last call. Its first message may have been rejected; then the
+        next one counts as the first."""
         unnoticed, self._unnoticed = self._unnoticed, False
         return unnoticed
 
 
 class InterleavedSequences:
-    """Finds lost messages on a topic of several publishers, which the middleware does not tell apart.
+    """Finds lost messages on a topic of several publishers, whose messages the middleware does not distinguish.
 
-    Each number is taken as part of the sequence with the largest number below it. If that sequence is another
+    Each number is assigned to the sequence with the largest number below it. If that sequence is another
     publisher's, a loss can stay hidden, until two messages were read while there was one publisher alone.
     """
 

@@ -1,22 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From frames of single meshes to frames of the scene: versions, order, matching. No ROS, no threads.
+"""Joins frames of single meshes to frames of the scene: versions, order, matching. No ROS, no threads.
 
 Rules, in the order in which they are applied to a vertex message:
 
-1. Its topology version must be the one in force (topology_version.py); that of a whole mesh carries its topology,
-   which is in force from there on where it is another one. Else: Topology and vertices are separate topics,
-   nothing orders them: a newer one waits for its topology, at most ``max_pending`` frames a mesh; an older one is
-   taken with its own topology until a frame of a later one was accepted, then refused.
+1. Its topology version must be the current one (topology_version.py). A whole mesh contains its topology, which
+   becomes the current one. Otherwise topology and vertices are separate topics without a common order: a newer frame
+   waits for its topology, at most ``max_pending`` frames per mesh; an older one is used with its own topology until a
+   frame of a later one was accepted, and rejected afterwards.
 2. The number of vertices must be that of the topology.
-3. The frame_id must equal that of the scene (an empty one fits all): the one demanded, else that of the first
-   message. Where none is demanded, a stream that goes on in another one is a restart, as in 4, for neither a stray
-   first message nor a simulation that has ended may bind those that follow: at once if it comes from a new publisher
-   that is its mesh's only one; else after ``restart_after`` increasing stamps in a row, if no mesh sends in the
-   scene's frame meanwhile, as two meshes in different frames would take turns. Static meshes do not determine the
-   frame: their positions are kept by frame_id, and used where it is the scene's (restart.py).
-4. Its stamp must be later than the mesh's last. A stream that goes on from an earlier time (``restart_after``
-   increasing stamps in a row, or the first message of a new publisher) is a restart: all starts anew (restart.py).
-   A mesh that follows has no order of its own: its frames are asked for at stamps of another mesh that were accepted.
+3. The frame_id must equal that of the scene (an empty one fits all): the required one, or that of the first
+   message. If none is required, a stream that continues in another one is a restart, as in 4, because neither a stray
+   first message nor a simulation that has ended may fix it: at once if the message comes from a new publisher that is
+   the only one of its mesh; otherwise after ``restart_after`` increasing stamps in a row, if no mesh sends in the
+   scene's frame meanwhile, because two meshes in different frames would alternate. Static meshes do not determine the
+   frame: their positions are stored by frame_id and used if it is that of the scene (restart.py).
+4. Its stamp must be later than the mesh's last one. A stream that continues from an earlier time (``restart_after``
+   increasing stamps in a row, or the first message of a new publisher) is a restart of the whole scene (restart.py).
+   A mesh that follows has no order of its own: its frames are requested for accepted stamps of another mesh.
 5. Frames of several meshes are joined by their stamps (matching.py); static meshes keep their last positions.
 """
 
@@ -45,26 +45,26 @@ from hpccd_ros.frames.types import (
 
 
 class _MeshState:
-    """What is known of one mesh."""
+    """The state of one mesh."""
 
     def __init__(self, settings: MeshSettings, max_pending: int) -> None:
         self.name = settings.name
         self.static = settings.static
         self.whole = settings.whole
         self.topologies = TopologyHistory(max_pending)
-        self.early: deque[MeshFrame] = deque()  # their topology has not come
+        self.early: deque[MeshFrame] = deque()  # their topology has not arrived
         self.positions = StaticPositions()
         self.newest = 0.0  # arrival of the last message with the position of a static mesh, whether or not it is in use
         self.stamps = StampOrder(settings.name)
-        self.new_publisher = False  # came, and none of its frames was accepted yet
-        self.follows = False  # frames come for stamps of another mesh that were accepted
+        self.new_publisher = False  # it sent messages, and none of them was accepted yet
+        self.follows = False  # its frames are requested for accepted stamps of another mesh
 
 
 class FrameAssembler:
     """Joins checked messages of the meshes into frames of the scene.
 
-    meshes: in the order of the scene; at least one must not be static. following: names of those whose frames are asked
-    for, each for a stamp of another mesh that was accepted.
+    meshes: in the order of the scene; at least one must not be static. following: names of the meshes whose frames are
+    requested, each for an accepted stamp of another mesh.
     """
 
     def __init__(self, meshes: Sequence[MeshSettings], rules: AssemblyRules, following: Collection[str] = ()) -> None:
@@ -88,7 +88,7 @@ class FrameAssembler:
 
     @property
     def waiting(self) -> int:
-        """Messages received that are neither handed on nor dropped yet."""
+        """Messages received that are neither passed on nor dropped yet."""
         return self._matcher.waiting + sum(len(m.early) for m in self._meshes.values())
 
     @property
@@ -108,14 +108,14 @@ class FrameAssembler:
         ]
 
     def topology(self, mesh: str) -> Topology | None:
-        """The topology in force, or None."""
+        """The current topology, or None."""
         return self._meshes[mesh].topologies.current
 
     def set_topology(self, mesh: str, topology: Topology, new_publisher: bool = False) -> Outcome:
-        """Put a topology in force; frames that waited for it go on.
+        """Make a topology the current one; frames that waited for it continue.
 
-        A lower version than the one in force is refused, unless it comes from a new publisher (restarted
-        simulations count from the start again).
+        A lower version than the current one is rejected, unless it comes from a new publisher (restarted simulations
+        count from the start again).
         """
         state = self._meshes.get(mesh)
         if state is None:
@@ -154,7 +154,7 @@ class FrameAssembler:
         return self._admit(state, frame)
 
     def inherit(self, other: "FrameAssembler", meshes: Collection[str]) -> Outcome:
-        """Topologies and static positions of these meshes, which both have, and their frames that wait."""
+        """Take over topologies, static positions and waiting frames of these meshes, which both have."""
         outcome = Outcome()
         for name in meshes:
             ours, theirs = self._meshes[name], other._meshes[name]
@@ -165,7 +165,7 @@ class FrameAssembler:
         return outcome
 
     def clear(self, reason: Reason) -> list[Refusal]:
-        """Forget all frames (not topologies and static positions); what waits is refused for ``reason``."""
+        """Discard all frames, but not topologies and static positions. Waiting messages are dropped for ``reason``."""
         refusals = self._matcher.clear(reason)
         for state in self._meshes.values():
             refusals += [Refusal(state.name, reason) for _ in state.early]
@@ -286,12 +286,12 @@ def _no_positions(state: _MeshState, frame_id: str) -> str:
     )
 
 
-# Bounds what strangers can make the node keep.
+# Limits what untrusted publishers can make the node store.
 _MOST_FRAMES = 4
 
 
 class Kept(NamedTuple):
-    """``frame``: the first message with these positions; ``newest``: the last one, which may be the same again."""
+    """``frame``: the first message with these positions; ``newest``: the last one, with the same positions."""
 
     frame: MeshFrame
     newest: MeshFrame
@@ -303,7 +303,7 @@ class StaticPositions:
 
     @property
     def frame_ids(self) -> list[str]:
-        """The last one that was sent last."""
+        """In the order of sending."""
         return list(self._by_frame_id)
 
     @property
@@ -319,7 +319,7 @@ class StaticPositions:
             del self._by_frame_id[next(iter(self._by_frame_id))]
 
     def fitting(self, frame_id: str) -> Kept | None:
-        """The last positions in this coordinate frame; those that name none fit all, as does an empty frame_id."""
+        """The last positions in this coordinate frame. Positions without one fit all, and so does an empty frame_id."""
         fitting = [kept for name, kept in self._by_frame_id.items() if name in ("", frame_id) or not frame_id]
         return fitting[-1] if fitting else None
 

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which positions the core computes with. No ROS."""
+"""Limits of the coordinates that the core accepts. No ROS."""
 
 import numpy as np
 
 from hpccd_core.arguments import LARGEST_COORDINATE
 from hpccd_ros.frames.drops import Reason
 
-# Of meshes that move by poses. Between two poses a point is no farther out than twice the farther of its ends, counted
-# from the origin (rigid/screw.py: the arc bulges by half its chord at most); bounds of motion are no longer, and add up
-# with those of another mesh and a separation. All of it must be what the core takes, or a step fails in the middle.
+# Limit for meshes that move by poses. Between two poses the distance of a point from the origin is at most twice that
+# of the farther end (rigid/screw.py: the arc bulges by half its chord at most); bounds of motion are no longer, and add
+# up with those of another mesh and a separation. All of them must be within the core's limits, or a step fails halfway.
 LARGEST_OF_POSES = LARGEST_COORDINATE / 1000
 
 
 def unusable_coordinates(vertices: np.ndarray, by_poses: bool = False) -> tuple[Reason, str] | None:
-    """Why the core cannot take these positions, (n,3), or None. by_poses: nor the ways to and from them."""
+    """Why the core cannot use these positions, (n,3), or None. by_poses: including the motion to and from them."""
     largest = LARGEST_OF_POSES if by_poses else LARGEST_COORDINATE
     # Two reductions, as they need no array of their own; NaN passes through both and compares false.
     if not len(vertices) or (-largest <= float(vertices.min()) and float(vertices.max()) <= largest):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Why a frame did not take part in a detection, and how often.
+"""Reasons for which messages are not used, and their counters.
 
-Whoever drops a message hands a `Refusal` back to its caller; counters at the end add them up.
-The unit is one vertex message of one mesh, so that the counts add up:
+Code that drops a message returns a `Refusal` to its caller; counters at the end add them up. The unit is one vertex
+message of one mesh, so that the counts add up:
 received + lost in the middleware = answered + dropped + still waiting.
 """
 
@@ -13,10 +13,10 @@ from enum import StrEnum
 
 
 class Reason(StrEnum):
-    """Why a message was refused (it is wrong) or dropped (it is right, but could not be used)."""
+    """Why a message was rejected (it is invalid) or dropped (it is valid, but not used)."""
 
     UNKNOWN_MESH = "unknown_mesh"  # not in parameter `meshes`
-    # Lengths that do not fit each other; both or neither vertex array; missing field; no time; not to be deserialised.
+    # Inconsistent lengths; both or neither vertex array; missing field; invalid time; cannot be deserialised.
     MALFORMED = "malformed"
     UNSUPPORTED_TYPE = "unsupported_type"  # PointCloud2 field that is neither FLOAT32 nor FLOAT64
     BIG_ENDIAN = "big_endian"
@@ -24,32 +24,32 @@ class Reason(StrEnum):
     OUT_OF_RANGE = "out_of_range"  # a coordinate beyond what the core computes with
     TOO_LARGE = "too_large"  # above max_vertices, max_faces or max_edges
     INDEX_RANGE = "index_range"  # a face names a vertex that does not exist
-    BAD_TOPOLOGY = "bad_topology"  # refused by the core in words of its own
+    BAD_TOPOLOGY = "bad_topology"  # rejected by the core
     TOPOLOGY_CONFLICT = "topology_conflict"  # same version, other content
     OLD_TOPOLOGY = "old_topology"
-    NO_TOPOLOGY = "no_topology"  # the topology that the frame names has not come (in time)
-    NO_SHAPE = "no_shape"  # of a mesh that moves by poses: its vertices have not come
+    NO_TOPOLOGY = "no_topology"  # the topology of the frame has not arrived (in time)
+    NO_SHAPE = "no_shape"  # the vertices of a mesh that moves by poses have not arrived
     WRONG_COUNT = "wrong_vertex_count"
     FRAME_ID = "frame_id"
-    NO_TRANSFORM = "no_transform"  # mesh.NAME.transform asks for one that did not come
-    NO_JOINT_STATE = "no_joint_state"  # where the joints of a robot were then is not known
-    RATE = "rate"  # came faster than max_rate
+    NO_TRANSFORM = "no_transform"  # the transform of the frame did not arrive
+    NO_JOINT_STATE = "no_joint_state"  # the joint positions of a robot at that stamp are unknown
+    RATE = "rate"  # faster than max_rate
     BACKWARD = "stamp_backward"
     REPEATED = "stamp_repeated"
-    AHEAD = "stamp_ahead"  # of a transform or joint state: far after those that came before and after it
+    AHEAD = "stamp_ahead"  # a transform or joint state far ahead of those before and after it
     CONTRADICTED = "contradicted"  # a joint state: another publisher gives the same joint another position
-    LATE = "late"  # its stamp was already answered (or given up) when it came
+    LATE = "late"  # its stamp was already processed, or given up
     INCOMPLETE = "incomplete"  # another mesh had no frame for this stamp
-    STATIC_MISSING = "static_missing"  # the vertices of a static mesh have not come
-    RESTART = "restart"  # was waiting when the stream started anew
-    OVERLOAD = "overload"  # a newer frame took its place before the detection got to it
+    STATIC_MISSING = "static_missing"  # the positions of a static mesh have not arrived
+    RESTART = "restart"  # was waiting when the stream restarted
+    OVERLOAD = "overload"  # replaced by a newer frame before the detection
     MIDDLEWARE = "middleware"  # never arrived: gap in the publisher's sequence numbers
     DETECTION_FAILED = "detection_failed"
     STOPPED = "stopped"  # was waiting when the node was deactivated
 
 
 class Input(StrEnum):
-    """What a refused message was."""
+    """Kind of a rejected message."""
 
     VERTICES = "vertex messages"
     TOPOLOGY = "topologies"
@@ -63,12 +63,12 @@ class Aspect(StrEnum):
     PLACE = "place"  # its position
     SHAPE = "shape"  # for meshes that move by poses
     TOPOLOGY = "topology"
-    NOTHING = "nothing"  # it concerns nothing that is in use
+    NOTHING = "nothing"  # nothing that is in use
 
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """``messages`` of ``mesh`` (of a transform: its topic) that will not be used, and why.
+    """``messages`` of ``mesh`` (of a transform: its topic) that are not used, and why.
 
     ``text``: the problem and the remedy, for the log; "": there is no remedy. ``sent``: when the message was sent, ns
     of the system clock; None: unknown.
@@ -106,8 +106,8 @@ class RefusalCounter:
         return self._total
 
     def most_of(self, meshes: Iterable[str]) -> int:
-        """The largest count of one of these meshes: frames of the scene that were lost, as each of them has one
-        message of every deforming mesh, and where one is refused its partners are counted as incomplete."""
+        """The largest count of one of these meshes. It is the number of lost frames of the scene, because each of them
+        has one message of every deforming mesh, and the partners of a rejected one are counted as incomplete."""
         with self._lock:
             return max((self._by_mesh.get(mesh, 0) for mesh in meshes), default=0)
 

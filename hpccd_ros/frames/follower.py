@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes of which nobody sends frames: what moves all of them at once is looked up at stamps that others give. No ROS.
+"""Meshes without frames of their own: joint states that move all of them at once are looked up at stamps of other
+meshes. No ROS.
 
-Transforms, which move each mesh alone, are the pipeline's own matter.
+Transforms, which move each mesh separately, are handled by the pipeline.
 """
 
 from collections.abc import Sequence
@@ -13,15 +14,15 @@ from hpccd_ros.frames.types import MeshFrame
 
 
 class Followed(NamedTuple):
-    """``times``: for each stamp that goes on now, (mesh, frame in the scene's frame, whether a new publisher)."""
+    """``times``: for each stamp that continues now, (mesh, frame in the scene's frame, whether a new publisher)."""
 
     refusals: list[Refusal]
     times: list[list[tuple[str, MeshFrame, bool]]]
 
 
 class Follower(Protocol):
-    """``names``: of the meshes, in the order of the scene. ``waiting``: their frames asked for and not known yet.
-    ``begun``: how often the time of what moves them went back, and all that was known of it began anew."""
+    """``names``: of the meshes, in the order of the scene. ``waiting``: requested frames that are not known yet.
+    ``begun``: how often time went back, so that all samples were discarded."""
 
     @property
     def names(self) -> Sequence[str]: ...
@@ -33,23 +34,23 @@ class Follower(Protocol):
     def begun(self) -> int: ...
 
     def ask(self, stamp: int, received: float, new_publisher: bool) -> None:
-        """A frame of each mesh at ``stamp`` ns; `retry` tells what comes of it."""
+        """Request a frame of each mesh at ``stamp`` ns; `retry` returns it."""
 
     def retry(self, transforms: TransformBuffer) -> Followed:
-        """What is known now of the frames asked for."""
+        """Requested frames that are known now."""
 
     def latest(self, transforms: TransformBuffer) -> list[int | None]:
-        """Stamps up to which is known what moves the meshes; None: it is bound to no time. Raises NoTransformError:
-        something has not come at all."""
+        """The last stamp at which the meshes can be placed; None: at any time. Raises NoTransformError if something has
+        never arrived."""
 
     def clear(self, reason: Reason) -> list[Refusal]:
-        """Drop what waits, for ``reason``."""
+        """Drop waiting frames, for ``reason``."""
 
     def forget_future(self, stamp: int) -> None:
-        """The time is ``stamp`` again: what is known of times far beyond it is from before."""
+        """Discard samples far beyond ``stamp``, at which a new run begins."""
 
     def forget(self) -> None:
-        """All that is known of any time."""
+        """Discard all samples."""
 
     def warnings(self) -> list[str]:
-        """What the frames asked for wait for."""
+        """What requested frames are waiting for."""

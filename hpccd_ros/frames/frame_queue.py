@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bounded queue between the threads that receive and detect: the latest frames win. No ROS."""
+"""The bounded queue between the receiving and the detecting thread: it keeps the latest frames. No ROS."""
 
 import threading
 from collections import deque
@@ -10,18 +10,18 @@ from hpccd_ros.frames.types import SceneFrame
 
 @dataclass(frozen=True, eq=False)
 class Queued:
-    """``first``: no motion leads from the frame before to this one: it is only the start of the next step."""
+    """``first``: there is no motion from the previous frame to this one; it is only the start of the next step."""
 
     frame: SceneFrame
     first: bool
 
 
 class FrameQueue:
-    """Holds at most ``capacity`` frames that end a step; a newer one pushes the oldest out.
+    """Holds at most ``capacity`` frames that end a step; a newer one replaces the oldest.
 
     Capacity 1 is the latest-frame policy: memory and latency stay bounded however slow the detection is.
-    Frames that only start a step cost no detection: they have a place beside the others, else two frames that come
-    at once would lose the only step they make.
+    Frames that only start a step cost no detection and have separate places; otherwise two frames that arrive at once
+    would lose their only step.
     """
 
     def __init__(self, capacity: int) -> None:
@@ -34,7 +34,7 @@ class FrameQueue:
         self._closed = False
 
     def put(self, frame: SceneFrame) -> list[SceneFrame]:
-        """Add ``frame``; return what had to give way (after close: the frame itself)."""
+        """Add ``frame``; return the frames that it replaces (after close: the frame itself)."""
         with self._changed:
             if self._closed:
                 return [frame]
@@ -53,7 +53,7 @@ class FrameQueue:
             return lost
 
     def _starts_without_end(self) -> list[SceneFrame]:
-        """Take out starts whose end is gone; not the last one, which may still get its end."""
+        """Remove starts whose end is gone, except the last one, whose end may still arrive."""
         items = list(self._items)
         useless = [a for a, b in zip(items, items[1:], strict=False) if a.first and b.first]
         for item in useless:
@@ -67,7 +67,7 @@ class FrameQueue:
             return None if self._closed else self._items.popleft()
 
     def close(self) -> list[SceneFrame]:
-        """End the waiting of the reader; return what was left."""
+        """Wake the reader; return the remaining frames."""
         with self._changed:
             self._closed = True
             left = self.frames()
@@ -76,6 +76,6 @@ class FrameQueue:
             return left
 
     def frames(self) -> list[SceneFrame]:
-        """What waits: a copy."""
+        """A copy of the waiting frames."""
         with self._changed:
             return [item.frame for item in self._items]

@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.frames.types import MeshFrame
 
-# Where nobody sends frames of what is missing, so that no stamps could be wrong.
+# For missing frames that no publisher sends, so their stamps cannot be wrong.
 _MOVED = "descriptions, joint states or transforms for that stamp did not come in time: /diagnostics tells which"
 
 
@@ -27,7 +27,7 @@ class Match:
 
 
 class Matched(NamedTuple):
-    """What one frame brought about: ``matches`` that it completes, oldest first, and frames that are given up."""
+    """Result of one frame: the ``matches`` that it completes, oldest first, and frames that are dropped."""
 
     matches: list[Match]
     refusals: list[Refusal]
@@ -38,20 +38,20 @@ class Matcher(Protocol):
         """Add one frame to those that wait."""
 
     def take(self, meshes: Collection[str]) -> list[tuple[str, MeshFrame]]:
-        """Frames of these meshes that wait and were in no match yet, by their stamps; they wait no more."""
+        """Remove and return the frames of these meshes that were in no match yet, by stamp."""
 
     def clear(self, reason: Reason) -> list[Refusal]:
-        """Drop all that waits, for ``reason``."""
+        """Drop all waiting frames, for ``reason``."""
 
     @property
     def waiting(self) -> int:
-        """Messages that wait for their partners."""
+        """Number of messages that wait for their partners."""
 
 
 class ExactMatcher:
-    """A match is one frame of each mesh with the very same stamp.
+    """A match is one frame of each mesh with the same stamp.
 
-    At most ``max_pending`` stamps wait; the oldest gives way. following: meshes of which nobody sends frames.
+    At most ``max_pending`` stamps wait; then the oldest is dropped. following: meshes without a publisher.
     """
 
     def __init__(self, meshes: list[str], max_pending: int, following: Collection[str] = ()) -> None:
@@ -155,7 +155,7 @@ class NearestMatcher:
     def _discard_farther(self, mesh: str, stamp: int) -> list[Refusal]:
         """Leave the frame that is nearest to ``stamp`` as the first of its queue."""
         queue, refusals = self._queues[mesh], []
-        # References come in order, so what is farther than its successor now is so for all that follow.
+        # References come in order: a frame that is farther than its successor stays so.
         while len(queue) > 1 and abs(queue[1].stamp - stamp) <= abs(queue[0].stamp - stamp):
             refusals += self._discard(mesh)
         return refusals

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The way of a checked message to frames of the scene: transform, assemble, queue. No ROS, no threads of its own."""
+"""Turns a checked message into frames of the scene: transform, assemble, queue. No ROS, no threads."""
 
 import time
 from collections.abc import Collection, Sequence
@@ -28,10 +28,10 @@ from hpccd_ros.frames.types import (
 
 
 class FramePipeline:
-    """The node and a replay push the messages of the ``meshes`` in; frames of the scene and refusals come out.
+    """The node and a replay push messages of the ``meshes``; the pipeline returns frames of the scene and rejections.
 
-    followers: of those meshes whose ``input`` is JOINTS, each of exactly one. transforms: to be filled from outside, as
-    what the followers look at, then `retry`.
+    followers: of the meshes whose ``input`` is JOINTS, each mesh in exactly one. transforms: filled by the caller, like
+    the samples of the followers; call `retry` afterwards.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class FramePipeline:
         self._queue: FrameQueue | None = None
         self._rigid = {mesh.name: RigidMesh(mesh) for mesh in self._meshes if mesh.rigid}
         others = (mesh.name for mesh in self._meshes if not mesh.static and mesh.input not in (TF, JOINTS))
-        # Whose stamps are those of the scene's frames; None: frames of all that moves are asked for.
+        # The mesh whose stamps are those of the scene's frames; None: all frames are requested.
         self._leader = next(others, None)
         asked = [mesh.name for mesh in self._meshes if mesh.input in (TF, JOINTS)]
         self._assembler = FrameAssembler(self._meshes, rules, asked if self._leader is not None else [])
@@ -51,21 +51,20 @@ class FramePipeline:
         self._use_transforms(TransformBuffer())
 
     def load(self, mesh: str, topology: Topology, positions: MeshFrame | None) -> Outcome:
-        """A mesh from a file. positions: of a static one, in the scene's frame already; of one that moves by poses, as
-        in the file."""
+        """Load a mesh from a file. positions: of a static mesh, in the scene's frame; of one that moves by poses, as in
+        the file."""
         outcome = self._assembler.set_topology(mesh, topology)
         if positions is not None and mesh in self._rigid:
             if (refusal := self._rigid[mesh].set_shape(positions)) is not None:
                 outcome.refusals.append(refusal)
         elif positions is not None:
             outcome += self._assembler.add(mesh, positions)
-        outcome.static_taken = 0  # no message brought them
+        outcome.static_taken = 0  # they did not come by a message
         return outcome
 
     def inherit(self, other: "FramePipeline", meshes: Collection[str]) -> Outcome:
-        """What is in force at any time: transforms, and topologies, static positions and shapes of these meshes, which
-        both have; and their frames that wait. Before anything is pushed; ``other`` is to be used no more, but to be
-        stopped."""
+        """Take over transforms, and topologies, static positions, shapes and waiting frames of these meshes, which both
+        have. Call it before anything is pushed; ``other`` must then only be stopped."""
         self._use_transforms(other.transforms)
         for name in meshes:
             self._transformers[name] = other._transformers.pop(name)
@@ -74,7 +73,7 @@ class FramePipeline:
         return self._led(self._assembler.inherit(other._assembler, meshes))
 
     def push(self, mesh: str, message: MeshFrame | PoseFrame | Topology, new_publisher: bool = False) -> Outcome:
-        """One message of ``mesh``. new_publisher: it is the first of its publisher, or the first that could be read."""
+        """Add a message of ``mesh``. new_publisher: it is the first of its publisher, or the first readable one."""
         if isinstance(message, Topology):
             return self._led(self._assembler.set_topology(mesh, message, new_publisher))
         if isinstance(message, MeshFrame) and mesh in self._rigid:
@@ -84,8 +83,7 @@ class FramePipeline:
         return self._place(mesh, message, new_publisher)
 
     def retry(self) -> list[Outcome]:
-        """Frames go on that waited for transforms which have come, each with an outcome of its own: a single transform
-        may let many go on."""
+        """Continue frames whose transforms have arrived, with an outcome for each: one transform may complete many."""
         found = [self._ask_for_latest()] if self._leader is None else []
         for mesh, transformer in self._transformers.items():
             if transformer.waiting:
@@ -96,16 +94,16 @@ class FramePipeline:
         return found
 
     def enqueue(self, frame: SceneFrame) -> list[Refusal]:
-        """Into the queue with a frame that came up; those that had to give way are refused."""
+        """Put a complete frame into the queue; frames that it replaces are dropped."""
         return [refusal for lost in self._queue.put(frame) for refusal in lost.refused(Reason.OVERLOAD)]
 
     def start(self, capacity: int) -> FrameQueue:
-        """The queue that `enqueue` fills from now on, of so many frames that end a step."""
+        """Create the queue that `enqueue` fills from now on, for this number of frames that end a step."""
         self._queue = FrameQueue(capacity)
         return self._queue
 
     def stop(self) -> Outcome:
-        """Refuse what waits as stopped, close the queue. Topologies and positions of static meshes stay."""
+        """Drop waiting messages as stopped and close the queue. Topologies and static positions stay."""
         outcome = Outcome()
         for transformer in self._transformers.values():
             outcome.refusals += transformer.clear(Reason.STOPPED)
@@ -121,7 +119,7 @@ class FramePipeline:
 
     @property
     def waiting(self) -> int:
-        """Messages pushed whose frame has neither come up nor been refused, and those in the queue."""
+        """Messages whose frame is neither complete nor dropped, and those in the queue."""
         queued = self._queue.frames() if self._queue is not None else ()
         places = (*self._transformers.values(), *self._requested.followers)
         before = self._assembler.waiting + sum(place.waiting for place in places)
@@ -140,20 +138,20 @@ class FramePipeline:
         self._assembler.restart_after = count
 
     def moves_by_poses(self, mesh: str) -> bool:
-        """Whether vertices of ``mesh`` are its shape, and its position comes from elsewhere."""
+        """Whether the vertices of ``mesh`` are its shape, and poses give its position."""
         return mesh in self._rigid
 
     def topology(self, mesh: str) -> Topology | None:
-        """The topology in force, or None."""
+        """The current topology, or None."""
         return self._assembler.topology(mesh)
 
     def awaited_transform(self, mesh: str) -> list[str]:
-        """What frames of ``mesh`` wait for, in words; empty: none waits."""
+        """What frames of ``mesh`` are waiting for, in words; empty: none waits."""
         return self._transformers[mesh].warnings()
 
     def warnings(self) -> list[str]:
-        """Positions of static meshes that are not used, what followers wait for, and why there is no time of a frame
-        where transforms or joints alone move the scene."""
+        """Static positions that are not used, what followers are waiting for, and, if transforms or joints alone move
+        the scene, why there is no frame."""
         lines = self._assembler.warnings()
         lines += [line for follower in self._requested.followers for line in follower.warnings()]
         return lines + (self._requested.warnings() if self._leader is None else [])
@@ -168,8 +166,8 @@ class FramePipeline:
         return outcome
 
     def _led(self, outcome: Outcome) -> Outcome:
-        """With all that comes of accepted frames of the leader: meshes whose frames are asked for have theirs then."""
-        if outcome.restarts and self._leader is not None:  # before anything is asked of the new run
+        """Add the frames of the other meshes that are requested for accepted frames of the leader."""
+        if outcome.restarts and self._leader is not None:  # before the new run is used
             outcome.refusals += self._clear_requested()
             for _, stamp, _ in outcome.joined[-1:]:
                 self._requested.forget_future(stamp)
@@ -180,7 +178,7 @@ class FramePipeline:
         return outcome
 
     def _ask(self, stamp: int, received: float, new_publisher: bool = False) -> Outcome:
-        """A frame of each mesh that transforms or joints move."""
+        """Request a frame of each mesh that transforms or joints move."""
         outcome = Outcome()
         for mesh in self._requested.by_transforms:
             outcome.asked.append(mesh.name)
@@ -194,12 +192,12 @@ class FramePipeline:
         return outcome
 
     def _ask_for_latest(self) -> Outcome:
-        """Where nothing else moves: a frame for each time that all inputs have reached."""
+        """If nothing else moves: request a frame for each time that all inputs have reached."""
         requested = self._requested
         if (stamp := requested.next(self._assembler.restart_after)) is None:
             return Outcome()
         outcome = Outcome()
-        if requested.reached.restarted:  # before a frame is placed by samples of the run before
+        if requested.reached.restarted:  # before samples of the previous run place a frame
             outcome.refusals += self._clear_requested()
             if requested.reached.set_back:
                 requested.forget_future(stamp)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a stream that starts anew is told from one with stray messages, by increasing stamps in a row: the order of the
-stamps of a mesh and the coordinate frame of the scene, rules 4 and 3 of the assembler. No ROS."""
+"""Distinguishes a restarted stream from stray messages by increasing stamps in a row: the order of the stamps of a mesh
+and the coordinate frame of the scene, rules 4 and 3 of the assembler. No ROS."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from hpccd_ros.frames.types import MeshFrame
 
 @dataclass(frozen=True)
 class Restart:
-    """The stream starts anew with the message that is looked at; ``text``: in what way."""
+    """The stream restarts with the current message; ``text``: why."""
 
     text: str
 
@@ -30,7 +30,7 @@ class IncreasingStamps:
 
 
 class StampOrder:
-    """What is known of the stamps of ``mesh``, ns."""
+    """The state of the stamps of ``mesh``, ns."""
 
     def __init__(self, mesh: str) -> None:
         self._mesh = mesh
@@ -46,7 +46,7 @@ class StampOrder:
         self._backward = IncreasingStamps()
 
     def check(self, stamp: int, restart_after: int, from_new_publisher: bool) -> Refusal | Restart | None:
-        """None where the message comes in order."""
+        """None if the message is in order."""
         last = self._last
         if last is None or stamp > last:
             return None
@@ -59,7 +59,8 @@ class StampOrder:
 
 
 class CoordinateFrame:
-    """``name``: the frame in force, "" as long as no message has named one. demanded: "": that of the first message."""
+    """``name``: the current frame, "" before any message names one. demanded: the required one; "": that of the first
+    message."""
 
     def __init__(self, demanded: str) -> None:
         self._demanded = demanded
@@ -69,24 +70,24 @@ class CoordinateFrame:
         """As before the first message."""
         self.name = self._demanded
         self._set_by = ""
-        self._elsewhere: dict[str, tuple[str, IncreasingStamps]] = {}  # mesh -> another frame that it sends in
+        self._elsewhere: dict[str, tuple[str, IncreasingStamps]] = {}  # mesh -> the other frame in which it sends
 
     @property
     def source(self) -> str:
-        """Where the frame in force comes from; "" as long as there is none."""
+        """What determined the current frame; "" if there is none."""
         if self._demanded:
             return "parameter frame_id"
         return f"a message of mesh {self._set_by}" if self._set_by else ""
 
     def adopt(self, mesh: str, frame_id: str) -> None:
-        """A message was accepted: the first that names a frame sets that of the scene."""
+        """Call it for accepted messages: the first that names a frame sets that of the scene."""
         if frame_id and not self.name:
             self.name, self._set_by = frame_id, mesh
 
     def check(
         self, mesh: str, frame: MeshFrame, restart_after: int, from_new_publisher: bool
     ) -> Refusal | Restart | None:
-        """None where the message fits. from_new_publisher: and that is the mesh's only one."""
+        """None if the message fits. from_new_publisher: the publisher is new and the only one of its mesh."""
         if not frame.frame_id or not self.name:
             return None
         if frame.frame_id == self.name:
@@ -102,7 +103,7 @@ class CoordinateFrame:
         return self._refuse(mesh, frame)
 
     def check_static(self, mesh: str, frame: MeshFrame) -> Refusal | None:
-        """Positions of a static mesh may be in any frame but where one is demanded."""
+        """Positions of a static mesh may be in any frame, unless one is required."""
         fits = not self._demanded or frame.frame_id in ("", self._demanded)
         return None if fits else self._refuse(mesh, frame)
 

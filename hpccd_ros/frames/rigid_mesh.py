@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes placed by poses: one that keeps its shape, which is given once, has a frame of each pose; one of a file is a
-topology, and if it is static, positions placed by its pose. No ROS."""
+"""Meshes placed by poses. A rigid mesh, whose shape is given once, has a frame for each pose; a mesh file is a topology
+and, for a static mesh, positions placed by its pose. No ROS."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ from hpccd_ros.frames.types import POSE, TF, UNKNOWN_TIME, MeshFrame, MeshSettin
 
 
 class RigidMesh:
-    """``mesh``: its settings; their ``pose`` says where vertices stand in the body's own frame."""
+    """``mesh``: its settings, whose ``pose`` places the vertices in the body frame."""
 
     def __init__(self, mesh: MeshSettings) -> None:
         self._mesh = mesh.name
@@ -26,8 +26,8 @@ class RigidMesh:
         self._sent = UNKNOWN_TIME  # when the shape was last sent
 
     def set_shape(self, shape: MeshFrame) -> Refusal | None:
-        """Its vertices, before ``pose``. The same as before leave the motion from pose to pose whole; a shape that is
-        refused leaves the one before."""
+        """Set its vertices, before ``pose``. Equal vertices do not interrupt the motion; a rejected shape leaves the
+        previous one."""
         before = self._shape
         if before is not None and before.version == shape.version and np.array_equal(before.vertices, shape.vertices):
             self._sent = shape.sent
@@ -41,7 +41,7 @@ class RigidMesh:
         return None
 
     def place(self, frame: PoseFrame) -> MeshFrame | Refusal:
-        """The vertices at a pose, as though they had been sent."""
+        """The vertices at a pose, as a frame of the mesh."""
         if self._shape is None or self._body is None:
             text = (
                 f"a pose came, and no vertices say what it moves; give a file (parameter mesh.{self._mesh}.file), or "
@@ -68,8 +68,8 @@ class RigidMesh:
 
 
 def mesh_of_file(vertices: np.ndarray, faces: np.ndarray, values: dict[str, Any]) -> tuple[Topology, MeshFrame | None]:
-    """What `load_mesh` gave as topology version 0; of a static mesh the positions too, placed by its pose; of one that
-    moves by poses the vertices as they are. values: parameters mesh.NAME.*.
+    """The result of `load_mesh` as topology version 0, with positions: of a static mesh placed by its pose, of one that
+    moves by poses as they are. values: parameters mesh.NAME.*.
 
     Raises MeshFileError: as `place`.
     """
@@ -77,7 +77,7 @@ def mesh_of_file(vertices: np.ndarray, faces: np.ndarray, values: dict[str, Any]
     if values["static"]:
         frame = MeshFrame(0, place(vertices, values["pose"]), version=0)
     elif values["input"] in (POSE, TF):
-        place(vertices, values["pose"], by_poses=True)  # to be refused with the file's name rather than with each pose
+        place(vertices, values["pose"], by_poses=True)  # reject it with the name of the file rather than at each pose
         frame = MeshFrame(0, vertices, version=0)
     return Topology(0, len(vertices), faces), frame
 

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What came over time and is looked at between two stamps: transforms, values of joints. No ROS. Bounded.
+"""Samples over time that are interpolated between two stamps: transforms and joint values. No ROS. Bounded.
 
-**A clock that is set back.** What came before is of another run, and is not mixed with what comes now. What goes back
-by more than a second has begun anew, and so has all. What goes back by less may only be late: until RESTART_AFTER
-samples in a row have increasing stamps, all before its last one. Where a mesh is known to have begun anew
-(`forget_future`) there is no doubt: what came before it went back is forgotten.
+**A clock that is set back.** Earlier samples belong to another run and are not mixed with later ones. If one frame or
+joint goes back by more than a second, all samples restart. If it goes back by less, its samples may only be late, until
+RESTART_AFTER samples in a row have increasing stamps, all before its last one. If a mesh is known to have restarted
+(`forget_future`), samples from before are discarded at once.
 
-**A stamp far ahead.** What comes more than HISTORY_NS after all before it may have a wrong stamp. It stands for its own
-time at once; what is before stays, and nothing is known of the time between, until the next sample: one that goes on
-from there confirms it, one that goes on from before makes it a stray, which is left out.
+**A stamp far ahead.** A sample more than HISTORY_NS after all others may have a wrong stamp. It is used for its own
+time, earlier samples stay, and the time between is unknown until the next sample: one that continues from there
+confirms it; one that continues from before makes it a stray, which is removed.
 """
 
 from bisect import bisect_left
@@ -18,10 +18,10 @@ from typing import Any, Generic, TypeVar
 from hpccd_ros.frames.restart import IncreasingStamps
 
 HISTORY_NS = 10_000_000_000
-# What goes back by more has begun anew; what came late may be so much earlier.
+# A larger step back is a restart; late samples may be earlier by up to this.
 RESTART_NS = 1_000_000_000
-RESTART_AFTER = 5  # as parameter restart_after has it by default
-MOST_SAMPLES = 1000  # of one thing: 100 Hz for the whole history
+RESTART_AFTER = 5  # the default of the parameter restart_after
+MOST_SAMPLES = 1000  # of one frame or joint: 100 Hz for the whole history
 
 Value = TypeVar("Value")
 
@@ -51,21 +51,21 @@ class Samples(Generic[Value]):
         return len(self.stamps) > 1 and self.stamps[-1] - self.stamps[-2] > HISTORY_NS
 
     def in_doubt(self, stamp: int) -> bool:
-        """Whether ``stamp`` is one of which the sample after the newest will tell."""
+        """Whether the next sample decides about ``stamp``."""
         return self.doubtful and self.stamps[-2] < stamp < self.stamps[-1]
 
     def makes_stray(self, stamp: int) -> bool:
-        """Whether a sample of ``stamp`` goes on from before the newest one, which was far ahead."""
+        """Whether a sample of ``stamp`` continues from before the newest one, which was far ahead."""
         return self.doubtful and self.stamps[-2] - RESTART_NS <= stamp < self.stamps[-1] - RESTART_NS
 
     def forget_newest(self, number: int) -> None:
-        """If it came with this number."""
+        """If it has this number."""
         if self.numbers and self.numbers[-1] == number:
             del self.stamps[-1], self.samples[-1], self.numbers[-1], self.sent[-1]
             self.since, self._behind = None, IncreasingStamps()
 
     def forget_before(self, number: int) -> None:
-        """Only samples that came with this number or later stay."""
+        """Keep only samples with this number or later ones."""
         kept = [place for place, came in enumerate(self.numbers) if came >= number]
         self.stamps = [self.stamps[place] for place in kept]
         self.samples = [self.samples[place] for place in kept]
@@ -81,7 +81,7 @@ class Samples(Generic[Value]):
         return self.sent[at] if self.stamps[at] == stamp else min(self.sent[at - 1], self.sent[at])
 
     def add(self, stamp: int, sample: Value, number: int, sent: int = 0) -> bool:
-        """Whether so many came behind the newest one that they are of another run."""
+        """Whether enough samples arrived behind the newest one that they belong to another run."""
         run = 0
         if self.stamps and stamp < self.stamps[-1]:
             run = self._behind.next(stamp)
@@ -104,9 +104,9 @@ class Samples(Generic[Value]):
 
 
 class Run:
-    """Of things that share a clock. all_samples: of each of them, as they are now.
+    """The frames or joints that share a clock. all_samples: of each of them.
 
-    ``begun``: how often their time went back, and all began anew.
+    ``begun``: how often their time went back, so that all were discarded.
     """
 
     def __init__(self, all_samples: Callable[[], Iterable[Samples[Any]]]) -> None:
@@ -116,8 +116,8 @@ class Run:
         self._first_after_restart: int | None = None  # the first stamp of the current run
 
     def add(self, stamp: int, of_message: Iterable[tuple[Samples[Value], Value]], sent: int = 0) -> int | None:
-        """Add the values of one message, which was sent at ``sent``. Returns the stamp of an earlier message that is
-        a stray and was removed."""
+        """Add the values of one message, which was sent at ``sent``. Returns the stamp of an earlier message that was a
+        stray and was removed."""
         self._came += 1
         stray = None
         for samples, value in of_message:
@@ -131,7 +131,7 @@ class Run:
         return stray
 
     def forget_future(self, stamp: int) -> None:
-        """A mesh begins anew with ``stamp``: samples beyond it are from before, but those that have begun anew too."""
+        """A mesh restarts at ``stamp``: discard samples beyond it, except those that have restarted too."""
         with_it = self._first_after_restart is not None and abs(stamp - self._first_after_restart) <= RESTART_NS
         for samples in self._all():
             if samples.since is not None:
@@ -141,13 +141,13 @@ class Run:
                 samples.forget_before(self._came + 1)
 
     def _leave_out(self, number: int, stamp: int) -> None:
-        """The message of this number, all that it told; the time is ``stamp`` again."""
+        """Remove the samples of the message with this number; the time is ``stamp`` again."""
         for samples in self._all():
             samples.forget_newest(number)
         self._first_after_restart = stamp
 
     def _restart(self, number: int, stamp: int) -> None:
-        """What came before would be interpolated with what comes now, of one thing and across things."""
+        """Discard earlier samples, which would be interpolated with later ones."""
         for samples in self._all():
             samples.forget_before(number)
         self._first_after_restart = stamp
@@ -155,7 +155,7 @@ class Run:
 
 
 def stray_text(stamp: int) -> str:
-    """Of a message that was left out."""
+    """Why a message was removed."""
     return (
         f"one of stamp {stamp} ns came more than {HISTORY_NS / 1e9:g} s ahead of those before and after it, and is "
         "left out; its publisher must stamp by the clock of the others, in sec and nanosec"

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How long frames have waited without any of them going on.
+"""How long frames have waited without any of them continuing. No ROS.
 
-Between a frame and what places it lies some time in any stream: that one waits just now says nothing. No ROS.
+In any stream some time passes between a frame and the message that places it, so a single waiting frame is normal.
 """
 
 import time
 
-# s without a frame that goes on, from which on it is worth a warning.
+# Seconds without a frame that continues, after which there is a warning.
 LONG = 0.5
 
 
@@ -15,12 +15,12 @@ class Standstill:
         self._since: float | None = None
 
     def waits(self) -> None:
-        """A frame waits, maybe beside others."""
+        """A frame waits, maybe with others."""
         if self._since is None:
             self._since = time.monotonic()
 
     def ends(self) -> None:
-        """A frame went on, or none waits any more."""
+        """A frame continued, or none waits any more."""
         self._since = None
 
     @property

@@ -6,15 +6,15 @@ from collections import deque
 from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
 from hpccd_ros.frames.types import UNKNOWN_TIME, MeshFrame, Topology
 
-# As many as the node's subscription to topologies holds (middleware/qos.py): so many can have overtaken a frame there.
+# The depth of the node's subscription to topologies (middleware/qos.py): this many can have overtaken a frame.
 _IN_THE_SUBSCRIPTION = 10
 
 
 class TopologyHistory:
-    """The topology of a mesh that is in force, and those before it whose frames may still come.
+    """The current topology of a mesh, and earlier ones whose frames may still arrive.
 
     Topologies and vertices are separate topics: a node that was busy for the length of a frame may read the next
-    topology before the last vertices of the one before. waiting: frames that may wait for a transform meanwhile.
+    topology before the last vertices of the previous one. waiting: frames that may wait for a transform meanwhile.
     """
 
     def __init__(self, waiting: int) -> None:
@@ -23,7 +23,7 @@ class TopologyHistory:
         self._superseded: deque[Topology] = deque(maxlen=_IN_THE_SUBSCRIPTION + waiting)
 
     def put(self, topology: Topology) -> None:
-        """Put a topology in force; a lower version than the one before is a new beginning."""
+        """Make a topology the current one; a version lower than the previous one is a restart."""
         if self.current is not None and self.current.version < topology.version:
             self._superseded.append(self.current)
         else:
@@ -36,20 +36,21 @@ class TopologyHistory:
         return self.sent if topology is self.current else topology.sent
 
     def of(self, frame: MeshFrame) -> Topology | None:
-        """The one that the frame names, where it was in force after the last accepted frame; else the current one."""
+        """The one that the frame names, if it was the current one after the last accepted frame; otherwise the current
+        one."""
         named = (t for t in self._superseded if t.version == frame.version)
         return next(named, self.current)
 
     def same_as(self, carried: Topology) -> Topology:
-        """The one in force where it is equal to that which a frame carries, else this one."""
+        """The current one if it equals the topology of a frame, otherwise the latter."""
         if self.current is not None and carried.version == self.current.version and carried.same_content(self.current):
             self.sent = carried.sent
             return self.current
         return carried
 
     def accept(self, frame: MeshFrame) -> bool:
-        """A frame was accepted: those after it belong to its topology or to a later one. Whether it carried a new one,
-        which is in force now."""
+        """Call it for accepted frames: later ones belong to the same topology or a later one. Returns whether the frame
+        contained a new one, which is now the current one."""
         if frame.topology is not self.current and not any(frame.topology is t for t in self._superseded):
             self.put(frame.topology)
             return True
@@ -61,7 +62,7 @@ class TopologyHistory:
 
 
 def check_successor(mesh: str, topology: Topology, current: Topology) -> Refusal | None:
-    """None where ``topology``, of other content, can follow ``current`` from the same publisher."""
+    """None if ``topology``, with other content, can follow ``current`` from the same publisher."""
     if topology.version == current.version:
         text = f"version {topology.version} is in force with other content; count the version up with each change"
         return refused_topology(mesh, Reason.TOPOLOGY_CONFLICT, text, topology)
@@ -76,12 +77,12 @@ def refused_topology(mesh: str, reason: Reason, text: str, topology: Topology) -
 
 
 def is_early(frame: MeshFrame, topology: Topology | None) -> bool:
-    """The frame belongs to a topology that has not come."""
+    """The frame belongs to a topology that has not arrived."""
     return topology is None or (frame.version is not None and frame.version > topology.version)
 
 
 def check_frame(mesh: str, frame: MeshFrame, topology: Topology) -> Refusal | None:
-    """None where a frame that is not early belongs to ``topology``, of its history."""
+    """None if a frame that is not early belongs to ``topology``, of its history."""
     if frame.version is not None and frame.version < topology.version:
         text = f"vertices belong to topology version {frame.version}, version {topology.version} is in force"
         return Refusal(mesh, Reason.OLD_TOPOLOGY, text, sent=frame.sent)

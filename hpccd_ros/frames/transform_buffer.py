@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A tree of coordinate frames over time, as tf2 keeps it: what is needed to bring positions into one frame. No ROS.
+"""A tree of coordinate frames over time, as in tf2, to transform positions into one frame. No ROS.
 
-The wheels hold no tf2; its rules are kept: the last ten seconds of each frame, interpolation between samples, no
-extrapolation. Bounded, as anybody may publish transforms. What becomes of it where a clock is set back, samples.py
-says.
+tf2 has no wheel. Its rules hold here: the last ten seconds of each frame, interpolation between samples, no
+extrapolation. The size is bounded, because anyone may publish transforms. samples.py describes clocks that are set
+back.
 """
 
 from bisect import bisect_left
@@ -18,10 +18,10 @@ LONGEST_NAME = 255
 
 
 class NoTransformError(LookupError):
-    """There is no transform; ``final``: none will come for this stamp either.
+    """There is no transform; ``final``: none can arrive for this stamp.
 
-    ``connected``: transforms lead from one frame to the other, only not for this stamp; where they do not, ``source``
-    is the first.
+    ``connected``: transforms connect both frames, but not at this stamp. If they do not, ``source`` is the first
+    frame.
     """
 
     def __init__(self, text: str, final: bool, connected: bool = True, source: str = "") -> None:
@@ -41,7 +41,7 @@ class _Edge(Samples[Rigid]):
         self.outdated = False
 
     def at(self, child: str, stamp: int) -> tuple[Rigid, int]:
-        """Like `at`, with the time at which the transform was sent."""
+        """As `at`, with the time at which the transform was sent."""
         if self.always is not None:
             return self.always, OUTDATED if self.outdated else ALWAYS
         at = bisect_left(self.stamps, stamp)
@@ -130,22 +130,22 @@ class TransformBuffer:
 
     @property
     def begun(self) -> int:
-        """How often their time went back, and all began anew."""
+        """How often their time went back, so that all were discarded."""
         return self._run.begun
 
     def forget_future(self, stamp: int) -> None:
-        """A mesh begins anew with ``stamp``: samples beyond it are from before, but those that have begun anew too."""
+        """A mesh restarts at ``stamp``: discard samples beyond it, except those that have restarted too."""
         self._run.forget_future(stamp)
 
     def lookup(self, source: str, target: str, stamp: int) -> Rigid:
-        """What takes coordinates in ``source`` to coordinates in ``target`` at ``stamp`` ns.
+        """The transform from coordinates in ``source`` to coordinates in ``target`` at ``stamp`` ns.
 
         Raises NoTransformError: unknown frame, no path, or no sample around the stamp.
         """
         return self.lookup_sent(source, target, stamp)[0]
 
     def lookup_sent(self, source: str, target: str, stamp: int) -> tuple[Rigid, int]:
-        """Like `lookup`, with the time at which the oldest transform used was sent."""
+        """As `lookup`, with the time at which the oldest transform used was sent."""
         source, target = source.removeprefix("/"), target.removeprefix("/")
         if source == target:
             return IDENTITY, ALWAYS
@@ -158,9 +158,9 @@ class TransformBuffer:
         return below.inverse().after(above), min(sent_below, sent_above)
 
     def latest(self, source: str, target: str) -> int | None:
-        """The last stamp, ns, that `lookup` knows between the two; None: what connects them is bound to no time.
+        """The last stamp, ns, at which `lookup` connects the two; None: at any time.
 
-        Raises NoTransformError: unknown frame, no path, or none whose samples have all come.
+        Raises NoTransformError: unknown frame, no path, or no stamp that all samples have reached.
         """
         source, target = source.removeprefix("/"), target.removeprefix("/")
         up, down = self._ancestors(source), self._ancestors(target)
@@ -178,8 +178,8 @@ class TransformBuffer:
         return min((edge.stamps[-1] for edge in timed), default=None)
 
     def account(self, frame: str) -> str:
-        """In words what has been heard at all, and which frames are known; those first that are called like ``frame``
-        but for what stands before. Bounded."""
+        """In words: messages received, and known frames, first those whose name is ``frame`` with another prefix.
+        Bounded."""
         topics = [f"{topic} {_messages(count)}" for topic, count in self.received.items()]
         last = frame.rpartition("/")[2]
         known = list(dict.fromkeys(name for child, edge in self._edges.items() for name in (child, edge.parent)))

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bring the positions of one mesh into the scene's frame, before frames are assembled. No ROS.
+"""Transforms the positions of one mesh to the scene's frame, before frames are assembled. No ROS.
 
-Where a transform has not come yet, frames wait for it in the order in which they came, as many as may wait for
-a topology; what cannot be transformed is refused with the reason. A frame whose coordinate frame nothing connects
-with the scene's, so that none may ever come, holds up nobody: it gives way as soon as a frame behind it is placed, as
-it could only come out of order from then on.
+If a transform has not arrived, frames wait for it in order, as many as may wait for a topology. Frames that cannot be
+transformed are rejected with the reason. A frame whose coordinate frame is not connected with the scene's blocks no
+other one: it is dropped as soon as a later frame is placed, because it would then be out of order.
 """
 
 from collections import deque
@@ -23,7 +22,7 @@ from hpccd_ros.frames.types import ALWAYS, TF, MeshFrame, MeshSettings
 
 
 class Transformed(NamedTuple):
-    """Frames in the scene's frame, each with whether it is the first of a new publisher; and those given up."""
+    """Frames in the scene's frame, each with whether it is the first of a new publisher, and dropped ones."""
 
     frames: list[tuple[MeshFrame, bool]]
     refusals: list[Refusal]
@@ -31,8 +30,7 @@ class Transformed(NamedTuple):
 
 @dataclass
 class _Waiting:
-    """``awaited``: the transform, in words; ``connected``: transforms lead from one frame to the other, only not for
-    this stamp."""
+    """``awaited``: the transform, in words; ``connected``: transforms connect both frames, but not at this stamp."""
 
     frame: MeshFrame
     new_publisher: bool
@@ -41,14 +39,14 @@ class _Waiting:
 
 
 class MeshTransformer:
-    """How the frames of ``mesh`` get into the scene's frame: its ``transform``, ``frame`` and ``pose``.
+    """Transforms the frames of ``mesh`` to the scene's frame, by its ``transform``, ``frame`` and ``pose``.
 
-    target: the scene's frame (parameter frame_id). transforms: looked at where ``transform`` is "tf".
+    target: the scene's frame (parameter frame_id). transforms: used if ``transform`` is "tf".
     """
 
     def __init__(self, mesh: MeshSettings, target: str, max_waiting: int, transforms: TransformBuffer) -> None:
         self._mesh = mesh.name
-        self._asked = mesh.input == TF  # then whoever asks has seen to what is from before
+        self._asked = mesh.input == TF  # then the caller has discarded earlier samples
         self._kind = "tf" if self._asked else mesh.transform
         self._frame = mesh.frame
         self._target = target
@@ -57,7 +55,7 @@ class MeshTransformer:
         self._waiting: deque[_Waiting] = deque()
         self._standstill = Standstill()
         self._last: int | None = None  # stamp that was last looked up
-        self._unnoticed = False  # the first frame of a new publisher was refused: the next one stands for it
+        self._unnoticed = False  # the first frame of a new publisher was rejected: the next one counts as the first
         self._pose = Rigid.of(mesh.pose[:3], mesh.pose[3:]) if self._kind == "pose" else None
 
     @property
@@ -65,12 +63,12 @@ class MeshTransformer:
         return len(self._waiting)
 
     def warnings(self) -> list[str]:
-        """What the frames are waiting for, where none has gone on for a while."""
+        """What frames are waiting for, if none has continued for a while."""
         waits_long = self._waiting and self._standstill.long
         return [f"{self._mesh} waits for a transform: {self._missing(self._waiting[0])}"] if waits_long else []
 
     def transform(self, frame: MeshFrame, new_publisher: bool = False) -> Transformed:
-        """Frames that can go on now that this one has come: with ``transform: none`` always itself."""
+        """Frames that can continue after this one: with ``transform: none`` always itself."""
         if self._kind == "none":
             return Transformed([(frame, new_publisher)], [])
         if text := self._wrong_frame_id(frame):
@@ -81,7 +79,7 @@ class MeshTransformer:
                 return Transformed([], [moved])
             return Transformed([(moved, self._noticed(new_publisher))], [])
         if new_publisher and not self._asked and self._last is not None and frame.stamp <= self._last:
-            self._transforms.forget_future(frame.stamp)  # before it is placed by what is from before
+            self._transforms.forget_future(frame.stamp)  # before earlier samples place it
         self._last = frame.stamp
         self._waiting.append(_Waiting(frame, new_publisher))
         frames, refusals = self.retry()
@@ -90,9 +88,9 @@ class MeshTransformer:
         return Transformed(frames, refusals)
 
     def retry(self) -> Transformed:
-        """Frames that can go on now; call after a transform has come."""
+        """Frames that can continue now. Call it after a transform has arrived."""
         frames, refusals = [], []
-        passed: list[_Waiting] = []  # before the one that is looked at, and not connected
+        passed: list[_Waiting] = []  # before the current one, and not connected
         while self._waiting:
             item = self._waiting[0]
             try:
@@ -123,7 +121,7 @@ class MeshTransformer:
         return Transformed(frames, refusals)
 
     def clear(self, reason: Reason) -> list[Refusal]:
-        """Drop what waits, for ``reason``."""
+        """Drop waiting frames, for ``reason``."""
         refusals = [Refusal(self._mesh, reason) for _ in self._waiting]
         self._waiting.clear()
         return refusals

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the node knows of a message once it is checked, and what comes of it: plain records of numpy arrays, no ROS."""
+"""Records of checked messages and of the frames made from them, with numpy arrays. No ROS."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -25,7 +25,7 @@ OUTDATED = -1
 
 @dataclass(frozen=True)
 class MeshSettings:
-    """How a mesh takes part in the scene (parameters ``mesh.NAME.*``). ``input``: "" where it does not matter."""
+    """Settings of a mesh (parameters ``mesh.NAME.*``). ``input``: "" if it does not matter."""
 
     name: str
     static: bool = False
@@ -34,11 +34,11 @@ class MeshSettings:
     frame: str = ""
     pose: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
     input: str = ""
-    whole: bool = False  # each message of its vertices carries its topology
+    whole: bool = False  # each message with vertices contains the topology
 
     @property
     def rigid(self) -> bool:
-        """It keeps its shape and moves by poses."""
+        """Whether it keeps its shape and moves by poses."""
         return self.input in (POSE, TF, JOINTS)
 
 
@@ -49,7 +49,7 @@ class AssemblyRules:
     max_pending: bound on the frames a mesh that wait for a topology, a transform or other meshes.
     restart_after: increasing stamps in a row, all before the last accepted one, that make a restart; 0: never.
     tolerance: None: stamps must be equal; else the largest difference in ns to the first deforming mesh.
-    frame_id: what all messages must carry; "": that of the first one.
+    frame_id: the coordinate frame of all messages; "": that of the first one.
     """
 
     max_pending: int = 8
@@ -64,7 +64,7 @@ NO_EDGES.flags.writeable = False
 
 @dataclass(frozen=True, eq=False)
 class Topology:
-    """Triangles of one mesh, ``faces`` (F,3) uint32, and edges beside theirs, ``edges`` (E,2) uint32; all below
+    """Triangles of one mesh, ``faces`` (F,3) uint32, and further edges, ``edges`` (E,2) uint32; indices are below
     ``n_vertices``. ``sent``: when its message was sent."""
 
     version: int
@@ -74,7 +74,7 @@ class Topology:
     sent: int = UNKNOWN_TIME
 
     def same_content(self, other: "Topology") -> bool:
-        """Equal but for the version."""
+        """Whether both are equal except for the version."""
         return (
             self.n_vertices == other.n_vertices
             and np.array_equal(self.faces, other.faces)
@@ -84,14 +84,14 @@ class Topology:
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Where a mesh that keeps its shape is: ``pose`` takes the coordinates of ``body`` to those of the frame."""
+    """Position of a rigid mesh: ``pose`` transforms coordinates of ``body`` to those of the frame."""
 
     body: Body
     pose: Rigid
 
     @cached_property
     def vertices(self) -> NDArray[np.float64]:
-        """(n,3). Not to be written to."""
+        """(n,3). Read-only."""
         return self.pose.apply(self.body.vertices)
 
     def moved(self, rigid: Rigid) -> "Placement":
@@ -115,7 +115,7 @@ class MeshFrame:
     """One vertex message of one mesh.
 
     ``stamp`` ns, end of the step. ``version``: of the topology it belongs to; None (PointCloud2 has none):
-    the one in force. ``step``: the publisher's number, None where it gives none. ``vertices`` (n,3) float32
+    the one in force. ``step``: the publisher's number, or None. ``vertices`` (n,3) float32
     or float64, finite. ``received``: time.monotonic() at its arrival; ``only_publisher``: its mesh had no other one of
     vertices then. ``topology``: carried by messages of whole meshes, else set by the assembler. ``placement``: of a
     mesh that moves by poses, which gives these vertices. ``sent``: when the oldest message that determines
@@ -136,7 +136,7 @@ class MeshFrame:
     shape_sent: int = UNKNOWN_TIME
 
     def of_topology(self, topology: Topology) -> "MeshFrame":
-        """Asked for each mesh of each frame of the scene: dataclasses.replace() takes four times as long."""
+        """Used for each mesh of each frame of the scene: dataclasses.replace() takes four times as long."""
         if topology is self.topology:
             return self
         frame = object.__new__(MeshFrame)
@@ -160,7 +160,7 @@ class Origin(NamedTuple):
 class SceneFrame:
     """Positions of all meshes at one time, in the order of the scene (parameter ``meshes``).
 
-    ``step``: of the first mesh that gives one, else a running number of complete frames.
+    ``step``: of the first mesh that has one, otherwise a counter of complete frames.
     ``fresh``: meshes whose message is used for the first time here. ``received``: of the last message needed.
     ``placements``: of meshes that move by poses, None of others; empty: none does. ``origins``: of all meshes.
     ``inputs``: number of inputs that the node had taken when the frame was complete (taken_inputs.py).
@@ -194,11 +194,11 @@ class SceneFrame:
 
 @dataclass(eq=False, slots=True)
 class Outcome:
-    """``frames`` of the scene that a message completes (usually none or one), ``refusals``: what will not be used.
+    """``frames`` of the scene that a message completes (usually none or one), ``refusals``: messages that are not used.
 
-    ``restarts``: in words, where the stream starts anew. ``static_taken``: accepted messages of static meshes, and
-    shapes of those that move by poses. ``asked``: meshes that transforms move, of each frame that was asked of them: it
-    counts as a message. ``joined``: (mesh, stamp ns, time of arrival) of frames that were accepted. ``unplaced``:
+    ``restarts``: why the stream restarts, in words. ``static_taken``: accepted messages of static meshes, and shapes of
+    those that move by poses. ``asked``: the mesh of each frame that was requested of transforms: it counts as a
+    message. ``joined``: (mesh, stamp ns, time of arrival) of frames that were accepted. ``unplaced``:
     static meshes whose positions a new topology has invalidated, and when the positions were sent.
     """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Corners of loose triangles that lie at one place become one vertex. No ROS."""
+"""Joins corners of loose triangles at equal positions to one vertex. No ROS."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,9 +8,9 @@ from hpccd_core.mesh_files.welding import weld
 
 
 class Welding:
-    """Of a stream of the same triangles: found in the first frame, and kept while what it joins stays together.
+    """For a stream of the same triangles: found in the first frame, and kept while joined corners stay together.
 
-    Vertices that only meet later stay two: a mesh that touches itself keeps its topology, and its contact is found.
+    Vertices that meet later stay separate: a mesh that touches itself keeps its topology, and its contact is found.
     """
 
     def __init__(self) -> None:
@@ -19,7 +19,8 @@ class Welding:
         self._faces = np.empty((0, 3), np.uint32)
 
     def vertices_and_faces(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
-        """points: (3 F, 3), finite, the corners of F triangles. The faces are the same array as long as they hold."""
+        """points: (3 F, 3), finite, the corners of F triangles. The faces are the same array as long as they are
+        valid."""
         vertices = points[self._first] if len(points) == len(self._vertex_of) else None
         if vertices is None or not np.array_equal(vertices[self._vertex_of], points):
             self._first, self._vertex_of = weld(points)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A robot from its URDF: a mesh for each link, which of them are never tested, and how they move. No ROS.
+"""A robot from its URDF: a mesh for each link, the pairs that are not tested, and their motion. No ROS.
 
 In the order of use (an example is in test/robots/test_robot.py):
 

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is wrong with a robot."""
+"""Errors about robots."""
 
 
 class RobotError(ValueError):
-    """A description, a semantic description or joint positions that cannot be used; the text names element and
-    remedy."""
+    """An invalid URDF, SRDF or joint state; the text names the element and the remedy."""
 
 
 class SemanticsError(RobotError):
-    """It is the semantic description, the SRDF, that cannot be used."""
+    """The SRDF is invalid."""

@@ -14,20 +14,20 @@ from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.shapes import MeshFile, Placed
 from hpccd_ros.robots.urdf import DOCUMENT, Link
 
-#: Of one robot: a few words of a description may ask for millions, or for one file a thousand times.
+#: Limit for one robot: a few words of a description may request millions, or one file a thousand times.
 MOST_TRIANGLES = 10_000_000
 
-#: The path of a mesh on this machine, of its URI as written.
+#: From the URI of a mesh to its path on this machine.
 Resolver = Callable[[str], str]
 
 
 def no_files(uri: str) -> str:
-    """A `Resolver` for descriptions that shall name no files."""
+    """A `Resolver` for descriptions that must not name files."""
     raise RobotError(f"mesh {quoted(uri)}: no files are read here; give a resolver")
 
 
 def beside(folder: Path, otherwise: Resolver) -> Resolver:
-    """A `Resolver`: relative paths start from ``folder``, that of the description's file."""
+    """A `Resolver`: relative paths start at ``folder``, that of the description's file."""
 
     def resolve(uri: str) -> str:
         return otherwise(uri) if "://" in uri or Path(uri).is_absolute() else str(folder / uri)
@@ -45,7 +45,7 @@ class LinkMeshes:
         self._triangles = 0
 
     def of(self, link: Link) -> solids.Triangles | None:
-        """(vertices (n,3) float64, faces (F,3) uint32) of all its shapes, one after the other; None: it has none.
+        """(vertices (n,3) float64, faces (F,3) uint32) of all its shapes, concatenated; None: it has none.
 
         Raises RobotError naming the link.
         """

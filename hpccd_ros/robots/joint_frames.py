@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames of all links of a robot at the stamps of others, where joint states move it.
+"""Frames of all links of a robot that joint states move, at the stamps of other meshes.
 
-Frames wait, in the order in which they were asked for, until joint states, and the transform of the base where one is
-needed, have passed their stamp: values are interpolated, never extrapolated.
+Requested frames wait in order until joint states, and the transform of the base if one is needed, have passed their
+stamp: values are interpolated, never extrapolated.
 """
 
 from collections import deque
@@ -33,8 +33,8 @@ class _Asked:
 class JointFrames:
     """A frames.follower.Follower. ``names``: of the meshes of ``robot``.
 
-    base: where the root link stands in the scene; None: the transform from the frame ``root`` to ``target``, that of
-    the scene, says it. most_waiting: frames of each mesh.
+    base: pose of the root link in the scene; None: the transform from the frame ``root`` to ``target``, that of the
+    scene. most_waiting: frames of each mesh.
     """
 
     def __init__(self, robot: Robot, base: Rigid | None, root: str, target: str, most_waiting: int) -> None:
@@ -119,7 +119,7 @@ class JointFrames:
         if base is None:
             base, of_base = self._base_by_transforms(asked.stamp, transforms)
             sent = min(sent, of_base)
-        # One state for all links: what a step computes of the joints is then computed once.
+        # One state for all links, so that a step computes the joints once.
         placements = self._robot.placements(self._robot.kinematics.state(values, base))
         return [
             (
@@ -150,10 +150,10 @@ class JointFrames:
 
     @property
     def _remedy(self) -> str:
-        """Where no transform leads to the base."""
+        """For a missing transform of the base."""
         return f"publish that, or give parameter robot.{self._robot.name}.pose"
 
     def _refused(self, reason: Reason, text: str, aspect: Aspect) -> list[Refusal]:
-        """The text once: it is of the robot, not of a link."""
+        """The text only once, because it is about the robot, not a link."""
         first, *others = self.names
         return [Refusal(first, reason, text, aspect=aspect), *(Refusal(name, reason, aspect=aspect) for name in others)]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joint states over time: the values of all joints of a robot at a stamp between two of them.
 
-Its rules are those of transforms: the last ten seconds of each joint, interpolation, no extrapolation, and nothing
-from before where a clock is set back (frames/samples.py). Bounded: only joints that the robot needs are kept.
+The rules are those of transforms: the last ten seconds of each joint, interpolation, no extrapolation, and no samples
+from before a clock was set back (frames/samples.py). Bounded: only joints that the robot needs are stored.
 """
 
 import math
@@ -17,12 +17,12 @@ from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.joint_publishers import JointPublishers
 from hpccd_ros.robots.kinematics import Kinematics
 
-# Joints that a message names one by one.
+# Most joints that a text names.
 MOST_NAMED = 3
 
 
 class NoJointStateError(LookupError):
-    """There are no values; ``final``: none will come for this stamp either."""
+    """There are no values; ``final``: none can arrive for this stamp."""
 
     def __init__(self, text: str, final: bool) -> None:
         super().__init__(text)
@@ -30,7 +30,7 @@ class NoJointStateError(LookupError):
 
 
 def check_lengths(names: Sequence[str], positions: Sequence[float]) -> None:
-    """Raises RobotError if no robot can use it. A joint state without positions has only velocities or efforts."""
+    """Raises RobotError if the message is malformed. A joint state without positions has only velocities or efforts."""
     if len(positions) not in (0, len(names)):
         raise RobotError(
             f"joint states: {len(names)} names and {len(positions)} positions; each joint needs one of both"
@@ -105,11 +105,11 @@ class JointHistory:
 
     @property
     def begun(self) -> int:
-        """How often their time went back, and all began anew."""
+        """How often their time went back, so that all were discarded."""
         return self._run.begun
 
     def forget_future(self, stamp: int) -> None:
-        """A mesh begins anew with ``stamp``: values beyond it are from before, but those that have begun anew too."""
+        """A mesh restarts at ``stamp``: discard values beyond it, except those that have restarted too."""
         self._run.forget_future(stamp)
 
     def at(self, stamp: int) -> dict[str, float]:
@@ -138,7 +138,8 @@ class JointHistory:
         return min((values.sent_at(stamp) for values in self._joints.values()), default=ALWAYS)
 
     def latest(self) -> int | None:
-        """The last stamp, ns, that `at` knows; None: no joint moves. Raises NoJointStateError: of some nothing came."""
+        """The last stamp, ns, at which `at` has values; None: no joint moves. Raises NoJointStateError: some have
+        none."""
         self._check_received()
         return min((values.stamps[-1] for values in self._joints.values()), default=None)
 
@@ -166,7 +167,7 @@ def _not_given(name: str, stamp: int) -> str:
 
 
 class _Values(Samples[float]):
-    """Of one joint."""
+    """Samples of one joint."""
 
     def __init__(self, continuous: bool) -> None:
         super().__init__()
@@ -176,7 +177,7 @@ class _Values(Samples[float]):
         return _Values(self._continuous)
 
     def at(self, stamp: int) -> float:
-        """Between the first and the last."""
+        """stamp: between the first and the last."""
         at = bisect_left(self.stamps, stamp)
         if self.stamps[at] == stamp:
             return self.samples[at]

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Iterable
 from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames.samples import HISTORY_NS
 
-# Bounds on memory that untrusted publishers can use: publishers of a topic, and values of a joint for each.
+# Limits on memory that untrusted publishers can use: publishers of a topic, and values of a joint for each.
 MOST_PUBLISHERS = 8
 MOST_VALUES = 32
 # Relative difference between two values that rounding to single precision can make.
@@ -21,7 +21,7 @@ TOLERANCE = 1e-6
 
 
 class PublisherNumbers:
-    """Tells the publishers of one topic apart by the sequence numbers of their messages, the only information from DDS.
+    """Distinguishes the publishers of a topic by the sequence numbers of their messages, the only information from DDS.
     A message belongs to the publisher with the closest number below its own."""
 
     def __init__(self) -> None:

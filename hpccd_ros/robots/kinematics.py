@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the links of a robot are, and how they move while its joints go from values to values.
+"""Positions of the links of a robot, and their motion while its joints change.
 
-Between two states each joint goes at constant speed: a continuous one the shorter way, all others straight from value
-to value, though it be more than a turn. What mimics a joint goes along with it. So a continuous joint that another
-mimics by a factor that is no whole number must come unwrapped, else the follower's value jumps with it.
+Between two states each joint moves at constant speed: a continuous one the shorter way, all others directly from value
+to value, even by more than a turn. Mimic joints follow. Therefore a continuous joint that another one mimics by a
+non-integer factor must be unwrapped, or the value of the follower jumps.
 
-Where the robot's base moves in the same step, its origin is taken to go straight while it turns at constant speed by at
-most half a turn, which is how tf2 interpolates. That is the motion of two more joints before the root: one that slides,
-one that turns (rigid/joints.py then holds as it is).
+If the robot's base moves in the same step, its origin moves straight while it rotates at constant speed by at most half
+a turn, as tf2 interpolates. That is the motion of two more joints before the root, a prismatic and a revolute one, so
+that rigid/joints.py applies unchanged.
 """
 
 import math
@@ -27,9 +27,9 @@ from hpccd_ros.base.quoting import listed
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.urdf import Description, RobotJoint
 
-# Radians or metres: of larger values a double tells less than a millionth, and a step would be wild.
+# Radians or metres: beyond this a double resolves less than a millionth, and no step is plausible.
 LARGEST_VALUE = 1e9
-_AHEAD = 2  # joints that move a base: a slide and a turn
+_AHEAD = 2  # joints that move a base: a prismatic and a revolute one
 
 
 @dataclass(frozen=True)
@@ -60,13 +60,13 @@ class Kinematics:
         needed = {f.joint for joint, f in zip(joints, self._followed, strict=True) if f and joint.name in moved}
         self.inputs = tuple(name for name in named if name in needed)
         self._others = {f.joint for f in self._followed if f} - needed
-        # The root's link has a joint too, which stands still. Turns are unwrapped here, for the sake of mimics.
+        # The root link has a joint too, which does not move. Angles are unwrapped here because of mimic joints.
         of_children = (
             Joint.of("revolute" if joint.turns else joint.kind, self._numbers[joint.parent], joint.origin, joint.axis)
             for joint in joints
         )
         self.chain = Chain((Joint.of("fixed", -1, IDENTITY), *of_children))
-        # Behind the joints that move the base, where it moves.
+        # After the joints that move the base, if it moves.
         self._behind = tuple(
             Joint(joint.kind, joint.parent + _AHEAD, joint.origin, joint.axis) for joint in self.chain.joints[1:]
         )
@@ -75,8 +75,8 @@ class Kinematics:
         return self._numbers[link]
 
     def state(self, positions: Mapping[str, float], base: Rigid = IDENTITY) -> "RobotState":
-        """positions: a finite value for each of `inputs`, radians or metres; unknown names are ignored. base: takes
-        coordinates of the root link to those of the scene. Raises RobotError naming missing joints."""
+        """positions: a finite value for each of `inputs`, radians or metres; unknown names are ignored. base:
+        transforms coordinates of the root link to those of the scene. Raises RobotError naming missing joints."""
         if missing := [name for name in self.inputs if name not in positions]:
             raise RobotError(f"positions: none for {listed(missing)}; each joint that moves and mimics none needs one")
         inputs = {name: float(positions[name]) for name in self.inputs}
@@ -89,14 +89,14 @@ class Kinematics:
         return RobotState(self, inputs, np.array(values), base)
 
     def step(self, start: "RobotState", end: "RobotState") -> "RobotStep":
-        """Both of this robot."""
+        """start, end: both of this robot."""
         ends = end.values.copy()
         for number, followed in enumerate(self._followed, 1):
             if followed is not None and followed.joint in self.continuous:
                 change = math.remainder(end.inputs[followed.joint] - start.inputs[followed.joint], 2 * math.pi)
                 ends[number] = start.values[number] + followed.factor * change
         if _same(start.base, end.base):
-            # Poses of both states are needed again, unless one is reached by another value of a joint.
+            # The poses of both states are used again, unless a joint reaches one by another value.
             known = {0.0: start.pose_rows}
             reached = np.array_equal(ends, end.values)
             if reached:
@@ -121,11 +121,11 @@ class RobotState:
     @cached_property
     def pose_rows(self) -> np.ndarray:
         """(links,7) float64: quaternion x y z w and shift of each."""
-        return self.kinematics.chain.poses(self.values + 0.0, self.base)  # -0.0 is 0.0, as on the way of a step
+        return self.kinematics.chain.poses(self.values + 0.0, self.base)  # -0.0 is 0.0, as during a step
 
     @cached_property
     def poses(self) -> dict[str, Rigid]:
-        """Of each link: takes its coordinates to those of the scene."""
+        """For each link: transforms its coordinates to those of the scene."""
         return dict(zip(self.kinematics.links, as_rigid(self.pose_rows), strict=True))
 
 
@@ -136,7 +136,7 @@ class RobotStep:
     kinematics: Kinematics
     joints: JointStep
     ahead: int  # joints that move the base
-    of_states: bool = False  # poses at both ends are those of the states, to the bit
+    of_states: bool = False  # poses at both ends are bit-identical to those of the states
 
     def poses(self, t: float) -> dict[str, Rigid]:
         """At the fraction t in [0, 1]."""
@@ -172,7 +172,7 @@ def _same(a: Rigid, b: Rigid) -> bool:
 
 
 def _base_joints(start: Rigid, end: Rigid) -> tuple[tuple[Joint, Joint], tuple[float, float]]:
-    """A slide and a turn, 0 at the start, and their values at the end."""
+    """A prismatic and a revolute joint, 0 at the start, and their values at the end."""
     origin = Rigid(IDENTITY.quaternion, start.shift)
     way = end.shift - start.shift
     far = rounding.length(way)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a link is because of the values of its robot's joints: what lets a step go by joints instead of screws."""
+"""Placement of a link by the joint values of its robot, so that steps follow joints instead of screws."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,7 +17,7 @@ from hpccd_ros.robots.kinematics import RobotState, RobotStep
 @dataclass(frozen=True, eq=False)
 class LinkPlacement(Placement):
     """``state``: of the whole robot, one object for all its links at a time; ``pose`` is that of ``link`` in it.
-    ``computed``: the vertices, where they were computed with those of the other links."""
+    ``computed``: the vertices, if they were computed with those of the other links."""
 
     link: str
     state: RobotState
@@ -38,13 +38,13 @@ class LinkPlacement(Placement):
 
 
 class LinkMotions:
-    """Of all links in one step: those of a robot share what is computed of its joints."""
+    """Motions of all links in one step; the links of a robot share the computation of its joints."""
 
     def __init__(self) -> None:
         self._steps: dict[tuple[int, int], RobotStep] = {}
 
     def between(self, start: Placement, end: Placement) -> LinkMotion | None:
-        """None: they are no places of the same link of the same robot by its joints."""
+        """None if they are not placements of the same link of the same robot."""
         if not isinstance(start, LinkPlacement) or not isinstance(end, LinkPlacement):
             return None
         before, after = start.state, end.state

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A robot as the node needs it: meshes of its links, pairs that are never tested, kinematics."""
+"""A robot: meshes of its links, pairs that are not tested, kinematics."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -23,7 +23,7 @@ from hpccd_ros.robots.placement import LinkPlacement
 
 
 class LinkVertices:
-    """bodies: of each mesh the number of its link, and its geometry in that link's frame."""
+    """bodies: for each mesh the number of its link, and its geometry in the frame of the link."""
 
     def __init__(self, bodies: Sequence[tuple[int, Body]]) -> None:
         ends = np.cumsum([len(body.vertices) for _, body in bodies]).tolist()
@@ -32,11 +32,11 @@ class LinkVertices:
         self._rows = [slice(begin, end) for begin, end in zip([0, *ends], ends, strict=False)]
 
     def placed(self, poses: np.ndarray) -> np.ndarray:
-        """(V,3) float64, as Rigid.apply gives them. poses (links,7): quaternion and shift."""
+        """(V,3) float64, as Rigid.apply returns them. poses (links,7): quaternion and translation."""
         return placed(poses, self._meshes, self._vertices)
 
     def of_meshes(self, vertices: np.ndarray) -> list[np.ndarray]:
-        """Views: of each mesh its own. vertices: (V,3) of all."""
+        """A view for each mesh. vertices: (V,3) of all."""
         return [vertices[rows] for rows in self._rows]
 
 
@@ -57,7 +57,7 @@ class RobotMesh:
 
     @property
     def vertices(self) -> np.ndarray:
-        """(n,3) float64. Not to be written to."""
+        """(n,3) float64. Read-only."""
         return self.body.vertices
 
 
@@ -122,7 +122,7 @@ class Robot:
         return LinkVertices([(self.kinematics.number(mesh.link), mesh.body) for mesh in self.meshes])
 
     def settings(self, frame_prefix: str = "", by_joints: bool = False) -> tuple[MeshSettings, ...]:
-        """Of each mesh, to be moved by joint states, or by transforms from the frame ``frame_prefix`` + link."""
+        """Settings of each mesh, moved by joint states, or by transforms from the frame ``frame_prefix`` + link."""
         moved = JOINTS if by_joints else TF
         return tuple(
             MeshSettings(mesh.name, self_collision=False, input=moved, frame=frame_prefix + mesh.link)
@@ -130,8 +130,8 @@ class Robot:
         )
 
     def placements(self, state: RobotState) -> tuple[LinkPlacement, ...]:
-        """Of each mesh, for frames of the scene: steps between these go by the joints. Raises RobotError: the core
-        cannot take where one is."""
+        """Placement of each mesh, for frames of the scene: steps between them follow the joints. Raises RobotError if
+        the core cannot use the position of one."""
         together = self._vertices.placed(state.pose_rows)
         vertices = self._vertices.of_meshes(together)
         if unusable_coordinates(together, by_poses=True):
@@ -144,7 +144,7 @@ class Robot:
         )
 
     def motions(self, start: RobotState, end: RobotState) -> tuple[LinkMotion, ...]:
-        """Of each mesh, between two states of this robot (kinematics.py says which motion that is)."""
+        """Motion of each mesh between two states of this robot (kinematics.py defines it)."""
         step = self.kinematics.step(start, end)
         return tuple(step.motion(mesh.link, mesh.body) for mesh in self.meshes)
 
@@ -178,7 +178,7 @@ def _sorted(of_names: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
 
 
 def _check_reach(description: urdf.Description, meshes: list[RobotMesh]) -> None:
-    """On its way between two states that the core can take, a link may be as far away as all offsets in a row."""
+    """Between two states that the core can use, a link may be as far away as the sum of all offsets."""
     offsets = sum(math.hypot(*joint.origin.shift.tolist()) for joint in description.joints)
     reach = offsets + max(mesh.body.radius for mesh in meshes)
     if not reach <= LARGEST_OF_POSES:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a link is made of, as its description says it: lengths in the unit of the description, metres."""
+"""Shapes of a link, as in its description; lengths in metres."""
 
 from dataclasses import dataclass
 
@@ -28,7 +28,7 @@ class Sphere:
 
 @dataclass(frozen=True)
 class Capsule:
-    """A cylinder along z with half a sphere at each end, which its length does not count."""
+    """A cylinder along z with half a sphere at each end, not included in its length."""
 
     radius: float
     length: float
@@ -36,7 +36,7 @@ class Capsule:
 
 @dataclass(frozen=True)
 class MeshFile:
-    """``uri``: as written; ``scale``: of x, y, z, before the origin is applied."""
+    """``uri``: as in the description; ``scale``: of x, y, z, before the origin is applied."""
 
     uri: str
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -47,7 +47,7 @@ Shape = Box | Cylinder | Sphere | Capsule | MeshFile
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """``origin`` takes coordinates of the shape to those of its link. ``line``: of the description."""
+    """``origin`` transforms coordinates of the shape to those of its link. ``line``: of the description."""
 
     shape: Shape
     origin: Rigid

@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """Boxes, cylinders, spheres and capsules as closed triangle meshes that contain them.
 
-A box is exact; one without thickness is a rectangle. Round shapes get a mesh around them, so that all that touches the
-solid touches or enters the mesh; no point of the mesh stands out of the solid by more than `outstanding`, at most the
-tolerance asked for.
+A box is exact; one without thickness is a rectangle. Round shapes get a mesh around them, so that everything that
+touches the solid touches or enters the mesh. No point of the mesh is farther outside the solid than `outstanding`, at
+most the requested tolerance.
 
-Why the mesh holds the solid. *Cylinder*: its ring is a regular polygon of n corners at the distance R from the axis;
+Why the mesh contains the solid. *Cylinder*: its ring is a regular polygon of n corners at the distance R from the axis;
 the sides are at R cos(pi/n) from it, which is the radius r. *Sphere*: rings of 0, 4, 8, ..., 4n, ..., 8, 4, 0 corners,
 all at the distance R from the centre, with the planes of all triangles at least at d R from it; d is computed. The
-surface surrounds the centre and comes no nearer to it than the nearest of these planes; R = r / d. *Capsule*: that
+surface surrounds the centre and is no closer to it than the nearest of these planes; R = r / d. *Capsule*: that
 sphere cut at its widest ring, with walls of the capsule's length between both halves. The half balls at its ends are
-held as the sphere is; each edge of the ring lies in a triangle, so it is at least at d R from the axis.
-How far it stands out: each point of these surfaces is within R of the axis, the centre, or the segment between the
+contained like the sphere; each edge of the ring lies in a triangle, so it is at least at d R from the axis.
+How far it is outside: each point of these surfaces is within R of the axis, the centre, or the segment between the
 centres, and no farther along the axis than the solid, where that has flat ends: R - r.
 
-Every round R is made larger by a factor of 1 + 2**-36, more than what its own rounding and that of the places of
-corners (64 times 2**-53 of their distance from the link's origin, up to 2,000 radii) may have taken away.
+Each R is multiplied by 1 + 2**-36. That exceeds the rounding errors of R and of the positions of the corners (64 times
+2**-53 of their distance from the link's origin, up to 2,000 radii).
 """
 
 import math
@@ -39,7 +39,7 @@ _OF_CYLINDER, _OF_SPHERE = (0.3, 0.32), (0.7, 1.1)
 
 
 def triangles(solid: Solid, tolerance: float) -> Triangles:
-    """(vertices (n,3) float64, faces (F,3) uint32), normals outwards. tolerance: how far it may stand out.
+    """(vertices (n,3) float64, faces (F,3) uint32), normals outwards. tolerance: how far it may be outside the solid.
 
     Raises RobotError: a tolerance that is not above 0, or needs more than MOST_SEGMENTS a ring.
     """
@@ -51,7 +51,7 @@ def triangles(solid: Solid, tolerance: float) -> Triangles:
 
 
 def outstanding(solid: Solid, tolerance: float) -> float:
-    """How far the mesh of that tolerance stands out of the solid at most."""
+    """How far the mesh of that tolerance is outside the solid at most."""
     if isinstance(solid, Box):
         return 0.0
     return _stands_out(solid, segments(solid, tolerance))
@@ -62,7 +62,7 @@ def segments(solid: Cylinder | Sphere | Capsule, tolerance: float) -> int:
     if not tolerance > 0.0:
         raise RobotError(f"tolerance {tolerance:g}: must be above 0")
     counts = range(FEWEST_SEGMENTS, MOST_SEGMENTS + 1, 4)
-    # With more corners a mesh stands out less. Few counts are tried, because each needs the whole mesh of a sphere.
+    # More corners bring the mesh closer to the solid. Few counts are tried, because each needs the mesh of a sphere.
     room = 1.0 - _LARGER / (1.0 + tolerance / solid.radius)  # bound on 1 - `_inner`
     shares = _OF_CYLINDER if isinstance(solid, Cylinder) else _OF_SPHERE
     low, high = (4.0 * math.sqrt(share / room) if room > 0.0 else math.inf for share in shares)
@@ -87,7 +87,7 @@ def _two_digits_up(number: float) -> float:
 
 
 def _inner(solid: Cylinder | Sphere | Capsule, count: int) -> float:
-    """The radius of what a mesh of corners at the distance 1 holds."""
+    """The radius of the solid that a mesh with corners at distance 1 contains."""
     return math.cos(math.pi / count) if isinstance(solid, Cylinder) else _inner_of_sphere(count // 4)
 
 

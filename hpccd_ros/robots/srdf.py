@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An SRDF, MoveIt's file beside a URDF: which pairs of links it takes from the check and which it puts back; and with
-it, which pairs are never tested against each other.
+"""An SRDF, MoveIt's file for a URDF: which pairs of links are disabled and which are enabled again; and the resulting
+pairs that are not tested against each other.
 
-Links joined by fixed joints are one body. Links of one body, and of two bodies that a joint joins, touch where they are
-joined. Others are tested, also those that meet across a link without geometry: an SRDF says of these what may touch.
+Links joined by fixed joints are one body. Links of one body, and of two bodies joined by a joint, touch at the joint
+and are not tested. All others are tested, also those joined by a link without geometry: an SRDF disables them.
 """
 
 from collections.abc import Iterable
@@ -27,7 +27,7 @@ class Semantics:
 
     disabled: frozenset[Pair] = frozenset()
     enabled: frozenset[Pair] = frozenset()
-    disabled_links: frozenset[str] = frozenset()  # with all others, but for what is enabled
+    disabled_links: frozenset[str] = frozenset()  # with all others, except enabled pairs
     ignored: str = ""
 
 
@@ -75,14 +75,15 @@ def _entries(
 
 
 def ignored(description: Description, semantics: Semantics | None = None) -> frozenset[Pair]:
-    """Pairs of names of links, in the order of their names. What the SRDF disables beats what it enables."""
+    """Pairs of names of links, in the order of their names. Pairs that the SRDF disables by name have priority over
+    enabled ones."""
     semantics = semantics or Semantics()
     by_default = _near(description) | _of_links(description, semantics.disabled_links)
     return (by_default - semantics.enabled) | {pair for pair in semantics.disabled if pair[0] != pair[1]}
 
 
 def _near(description: Description) -> frozenset[Pair]:
-    body = {link.name: link.name for link in description.links}  # of each link: the first of its body
+    body = {link.name: link.name for link in description.links}  # for each link: the first link of its body
     for joint in description.joints:  # from the root on
         if joint.kind == "fixed":
             body[joint.child] = body[joint.parent]

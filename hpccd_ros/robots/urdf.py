@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A URDF as links and joints.
 
-Read are ``link`` with its collision or visual geometry, and ``joint``; what else there is (inertia, materials,
-transmissions, what simulators and controllers add) says nothing of shape or motion.
+Only ``link``, with its collision or visual geometry, and ``joint`` are read. Other elements (inertia, materials,
+transmissions, extensions of simulators and controllers) do not describe shape or motion.
 """
 
 import math
@@ -22,12 +22,12 @@ GEOMETRIES = ("collision", "visual")
 KINDS = ("revolute", "continuous", "prismatic", "fixed")
 LONGEST_NAME = 255
 DOCUMENT = "URDF"
-MOST_LINKS = 1000  # the detection looks at each pair of them in each step
+MOST_LINKS = 1000  # the detection considers each pair of them in each step
 
 
 @dataclass(frozen=True)
 class Mimic:
-    """Its joint is at ``multiplier`` times the value of ``joint``, plus ``offset``."""
+    """The value of its joint is ``multiplier`` times that of ``joint``, plus ``offset``."""
 
     joint: str
     multiplier: float
@@ -61,7 +61,8 @@ class RobotJoint:
 
 @dataclass(frozen=True, eq=False)
 class Description:
-    """``joints``: each after the one that moves its parent. ``links``: as in the text. ``root``: no joint moves it."""
+    """``joints``: each after the one that moves its parent. ``links``: in the order of the text. ``root``: the link
+    that no joint moves."""
 
     name: str
     root: str
@@ -70,7 +71,7 @@ class Description:
 
 
 def parse(text: str, geometry: str = "collision") -> Description:
-    """geometry: which of a link's is read, one of GEOMETRIES. Raises RobotError naming the element."""
+    """geometry: which geometry of a link is read, one of GEOMETRIES. Raises RobotError naming the element."""
     if geometry not in GEOMETRIES:
         raise RobotError(f"geometry: {quoted(geometry)} is not known; choose from {', '.join(GEOMETRIES)}")
     robot = xml_tree.parse(text, DOCUMENT, "robot")
@@ -251,7 +252,7 @@ _SHAPES = {"box": _box, "cylinder": _cylinder, "sphere": _sphere, "capsule": _ca
 
 
 def _origin(element: Element) -> Rigid:
-    """xyz, and rpy: turns about the fixed axes x, y, z in this order."""
+    """xyz, and rpy: rotations about the fixed axes x, y, z in this order."""
     origin = element.one("origin")
     if origin is None:
         return IDENTITY

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""XML that strangers sent, as a tree whose elements know their line.
+"""Untrusted XML as a tree whose elements know their line.
 
-Nothing but the text is read: a document type, the only place where XML defines entities and names other files, is
-refused at its first character. Size, depth and number of elements are bounded.
+Only the text is read: a document type, the only place where XML defines entities and names other files, is rejected at
+its first character. Size, depth and number of elements are limited.
 """
 
 import re
@@ -35,7 +35,7 @@ _LOST = "\ufffd"
 
 @dataclass(eq=False)
 class Element:
-    """``document``: what the whole is called in errors."""
+    """``document``: its name in errors."""
 
     document: str
     tag: str
@@ -47,7 +47,7 @@ class Element:
         return [child for child in self.children if child.tag == tag]
 
     def one(self, tag: str) -> "Element | None":
-        """The child of this tag. Raises RobotError: there are several."""
+        """The child with this tag. Raises RobotError if there are several."""
         found = self.all(tag)
         if len(found) > 1:
             raise found[1].error(f"is the second in <{self.tag}> in line {self.line}; one is allowed")
@@ -60,7 +60,7 @@ class Element:
         return child
 
     def text(self, attribute: str) -> str:
-        """Raises RobotError: there is none, or it is empty."""
+        """Raises RobotError if there is none, or it is empty."""
         value = self.attributes.get(attribute, "")
         if not value.strip():
             raise self.error(f"needs the attribute {attribute}")
@@ -111,7 +111,7 @@ class _Builder:
         self._open: list[Element] = []
         self._root: Element | None = None
         self._count = 0
-        # The text is decoded already: what the document says of its encoding no longer matters.
+        # The text is already decoded: the encoding that the document declares no longer matters.
         self._parser = expat.ParserCreate("UTF-8")
         self._parser.StartElementHandler = self._start
         self._parser.EndElementHandler = self._end
@@ -127,7 +127,7 @@ class _Builder:
             raise RobotError(f"{self._document}: {why}") from error
         except UnicodeEncodeError as error:
             raise RobotError(f"{self._document}: is no text: {error}; save it as UTF-8") from error
-        assert self._root is not None  # expat demands an element
+        assert self._root is not None  # expat requires an element
         return self._root
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
