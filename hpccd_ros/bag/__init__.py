@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings: MCAP files as rosbag2 writes and reads them."""
+"""Recordings: MCAP files in rosbag2's layout."""

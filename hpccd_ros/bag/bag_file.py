@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One MCAP file of a recording that is being written: each write reaches the system whole, or leaves no trace."""
+"""One MCAP file of a recording that is being written: each write is complete, or leaves no trace."""
 
 import contextlib
 import dataclasses
@@ -16,12 +16,12 @@ from hpccd_ros.base.version import package_version
 
 
 class WholeWrites:
-    """A new file that only grows by whole writes. The MCAP library writes a record, such as a chunk, at a time, so a
-    file of a full disk ends behind its last whole record.
+    """A new file that only grows by complete writes. The MCAP library writes one record, such as a chunk, at a time, so
+    on a full disk the file ends after its last complete record.
 
-    Unbuffered: what `write` returned from survives the death of this process (not a loss of power: no fsync).
+    Unbuffered: data survives the end of this process once `write` has returned, but not a power failure (no fsync).
     size: bytes in the file.
-    Raises FileExistsError rather than overwrite.
+    Raises FileExistsError instead of overwriting a file.
     """
 
     def __init__(self, path):
@@ -29,14 +29,14 @@ class WholeWrites:
         self.size = 0
 
     def write(self, data: bytes) -> int:
-        """Append all of `data`, or take it back and raise OSError."""
+        """Append all of `data`, or undo the write and raise OSError."""
         view = memoryview(data)
         written = 0
         try:
             while written < len(view):
                 written += self._file.write(view[written:])
         except OSError:
-            # Should even this fail, the reader finds a torn record at the end, as of a killed process.
+            # If this fails too, the reader finds an incomplete record at the end, as of a killed process.
             with contextlib.suppress(OSError):
                 self._file.seek(self.size)
                 os.ftruncate(self._file.fileno(), self.size)
@@ -48,7 +48,7 @@ class WholeWrites:
         return self.size
 
     def flush(self) -> None:
-        """Nothing waits here."""
+        """Nothing is buffered here."""
 
     def close(self) -> None:
         self._file.close()
@@ -56,7 +56,7 @@ class WholeWrites:
 
 COMPRESSIONS = {"none": CompressionType.NONE, "lz4": CompressionType.LZ4, "zstd": CompressionType.ZSTD}
 
-# Name of the metadata record with what a replay needs beside the messages (parameters, topic names).
+# Name of the metadata record with the parameters and topic names that a replay needs.
 HPCCD_RECORD = "hpccd"
 
 
@@ -64,7 +64,7 @@ HPCCD_RECORD = "hpccd"
 class Topic:
     """A recorded topic. `qos` as from `qos_yaml.offered_qos`.
 
-    `latched`: how many of its last messages are repeated at the start of each file; `last`: these, as (log_time,
+    `latched`: number of its last messages that are repeated at the start of each file; `last`: these, as (log_time,
     publish_time, sequence, data).
     """
 
@@ -79,10 +79,10 @@ class Topic:
 
 
 class BagFile:
-    """An open file. counts: messages by topic. open_chunk: those of them that are not handed to the system yet.
+    """An open file. counts: messages by topic. open_chunk: those that are not written yet.
 
-    start, end: smallest and largest log time, ns. data_bytes: of all messages, uncompressed.
-    Every method but `abandon` raises OSError where the disk refuses; only `abandon` may follow that.
+    start, end: smallest and largest log time, ns. data_bytes: size of all messages, uncompressed.
+    Every method except `abandon` raises OSError if the disk fails; then only `abandon` may be called.
     """
 
     def __init__(self, path: Path, *, info: dict, attachments, compression: str, chunk_size: int):
@@ -111,7 +111,7 @@ class BagFile:
 
     @property
     def size(self) -> int:
-        """Bytes handed to the system."""
+        """Bytes written."""
         return self._stream.size
 
     def attach(self, name: str, data: bytes) -> None:
@@ -119,7 +119,7 @@ class BagFile:
         self._writer.add_attachment(now, now, name, "application/octet-stream", data)
 
     def register(self, topic: Topic) -> None:
-        """Describe a topic, before its first message."""
+        """Describe a topic before its first message."""
         before = self.size
         if topic.type_name not in self._schemas:
             text = message_definitions.definition_text(topic.type_name)
@@ -158,12 +158,12 @@ class BagFile:
             self.open_chunk.clear()
 
     def flush(self) -> None:
-        """Close the open chunk: all messages so far survive the death of this process."""
+        """Close the open chunk: all messages so far survive the end of this process."""
         self._writer.flush()
         self.open_chunk.clear()
 
     def finish(self, bag_metadata: dict) -> None:
-        """Close the open chunk, write index, statistics and footer. bag_metadata: rosbag2's, of this file."""
+        """Close the open chunk, write index, statistics and footer. bag_metadata: rosbag2's metadata of this file."""
         self.flush()
         self._writer.add_metadata("rosbag2", {"serialized_metadata": qos_yaml.to_yaml(bag_metadata)})
         self._writer.finish()
@@ -171,8 +171,8 @@ class BagFile:
         self.finished = True
 
     def abandon(self) -> None:
-        """Close without index and footer, after an error: `hpccd doctor` recovers the closed chunks, which are
-        what the counts then tell. A file without any is removed."""
+        """Close without index and footer, after an error: `hpccd doctor` recovers the closed chunks, and the counts are
+        those of the closed chunks. A file without any is removed."""
         self._stream.close()
         self.counts -= self.open_chunk
         self.open_chunk.clear()

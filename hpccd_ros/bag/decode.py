@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""CDR bytes of a recording -> message objects of the packages that are installed here."""
+"""Decodes CDR bytes of a recording to message objects of the installed packages."""
 
 from hpccd_ros.bag import message_definitions
 from hpccd_ros.bag.reader import RecordedTopic, RecordingError
@@ -7,12 +7,12 @@ from hpccd_ros.middleware.message_types import message_class
 
 
 def _has_installed_layout(topic: RecordedTopic) -> bool:
-    """Whether ``topic`` was recorded with the fields that its type has here.
+    """Whether ``topic`` was recorded with the fields of the installed type.
 
-    Raises LookupError where the type is not installed.
+    Raises LookupError if the type is not installed.
     """
     installed = message_definitions.definition_text(topic.type_name)
-    # The hash says whether two definitions have the same fields; the text would also differ by a comment.
+    # The hash is equal if the fields are; the text also contains comments.
     if topic.type_hash:
         return topic.type_hash == message_definitions.type_hash(topic.type_name)
     return _fields(topic.definition) == _fields(installed)
@@ -21,7 +21,7 @@ def _has_installed_layout(topic: RecordedTopic) -> bool:
 def _fields(definition: str) -> dict[str, list[str]]:
     """Name of the type ("" for the first one) -> its fields in order, which determine the layout of the CDR.
 
-    The rest differs between recorders: comments, spaces, default values, constants (which the hash does not cover
+    Other parts differ between recorders: comments, spaces, default values, constants (which the hash does not cover
     either), and whether names of types include the package.
     """
     own, *others = definition.split(message_definitions.SEPARATOR)
@@ -45,8 +45,8 @@ def _field(line: str) -> str:
 def make_decoder(topic: RecordedTopic):
     """Function (RecordedMessage -> message object) for `topic`.
 
-    Raises RecordingError where the type is not installed here, or was recorded with another definition: its bytes
-    would be misread silently.
+    Raises RecordingError if the type is not installed, or was recorded with another definition: its bytes would be
+    misread silently.
     """
     from rclpy.serialization import deserialize_message
 
@@ -55,7 +55,7 @@ def make_decoder(topic: RecordedTopic):
     def decode(message):
         try:
             return deserialize_message(message.data, cls)
-        except Exception as error:  # rclpy raises RMWError, RCLError or MemoryError, by what is wrong in the bytes
+        except Exception as error:  # rclpy raises RMWError, RCLError or MemoryError for invalid bytes
             raise RecordingError(
                 f"message of {topic.name} received at {message.log_time} ns is no valid {topic.type_name}: {error}"
             ) from error
@@ -66,7 +66,7 @@ def make_decoder(topic: RecordedTopic):
 def checked_type(topic: RecordedTopic):
     """The installed class of the messages of ``topic``.
 
-    Raises RecordingError where the type is not installed here, or was recorded with another definition.
+    Raises RecordingError if the type is not installed, or was recorded with another definition.
     """
     try:
         cls, same = message_class(topic.type_name), _has_installed_layout(topic)

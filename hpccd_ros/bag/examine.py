@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Check an MCAP file record by record: what is in it, and how much of a cut-off or damaged one is readable."""
+"""Checks an MCAP file record by record: its contents, and how much of a truncated or damaged one is readable."""
 
 import dataclasses
 from collections import Counter
@@ -18,13 +18,13 @@ from hpccd_ros.bag.writer import COMPRESSIONS
 
 @dataclasses.dataclass
 class Examination:
-    """What a walk over all records of a file found."""
+    """Result of reading all records of a file."""
 
     path: Path
     size: int  # bytes
-    readable: int = 0  # bytes from the start that hold whole, valid records
-    finished: bool = False  # index and footer are there
-    ended: bool = False  # as a finished file does: it was not cut off
+    readable: int = 0  # bytes from the start with complete, valid records
+    finished: bool = False  # index and footer exist
+    ended: bool = False  # like a finished file: it is not truncated
     problem: str = ""  # the first one, or ""
     profile: str = ""
     library: str = ""
@@ -33,8 +33,8 @@ class Examination:
     start: int = 0  # ns, smallest log time
     end: int = 0  # ns, largest log time
     chunks: int = 0
-    damaged_chunks: int = 0  # of which what follows the damage is skipped
-    orphans: int = 0  # messages of channels that nothing readable describes
+    damaged_chunks: int = 0  # in which records after the damage are skipped
+    orphans: int = 0  # messages of channels without a readable description
     compression: str = "none"
 
     @property
@@ -48,16 +48,16 @@ class Examination:
 
 
 def examine(path, visit: Callable = lambda record: None) -> Examination:
-    """Walk over all records of `path` with their check sums. Never raises for damage: it is in the result.
+    """Read all records of `path` with their checksums. Does not raise for damage, which is in the result.
 
     visit: is called with each whole record; a schema and a channel come before the first message that needs them.
-    Raises RecordingError where `path` cannot be opened.
+    Raises RecordingError if `path` cannot be opened.
     """
     return _Walk(Path(path), visit).result
 
 
 class _Walk:
-    """Calls `visit` for each whole record of a file, with those that a message needs before it."""
+    """Calls `visit` for each complete record of a file, schemas and channels before their messages."""
 
     def __init__(self, path: Path, visit: Callable):
         self._visit = visit
@@ -96,7 +96,7 @@ class _Walk:
                     self._note(why)
 
     def _whole_records(self, stream):
-        # What `visit` raises, such as a full disk, is no damage: so the loop is not in here.
+        # Errors of `visit`, such as a full disk, are no damage: the loop is outside.
         try:
             yield from data_section(stream, self.result.size)
         except DAMAGE as error:
@@ -122,12 +122,12 @@ class _Walk:
             elif record is not None:
                 yield record
         except DAMAGE as error:
-            # The frame of the record is whole: what follows it can be read.
+            # The frame of the record is complete, so later ones can be read.
             result.damaged_chunks += raw.opcode == Opcode.CHUNK
             self._note(_text(error))
 
     def _read_index(self, stream):
-        """(index or None, where the data must end, why there is none). It may describe what a damaged chunk did."""
+        """(index or None, where the data must end, why there is none). The index may describe a damaged chunk."""
         try:
             stream.seek(max(0, self.result.size - len(MCAP0_MAGIC)))
             if stream.read() != MCAP0_MAGIC:

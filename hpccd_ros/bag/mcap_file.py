@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One finished MCAP file: what it holds, and its messages in the order of time, with all check sums.
+"""One finished MCAP file: its contents, and its messages in the order of time, with all checksums.
 
 The index has the topics and their message counts, so that the data need not be unpacked for them. Recorders may omit
-any of that; then the data is unpacked once more. The positions of the messages come from the data itself: a message
-that the index lacks, or has elsewhere, would be skipped silently.
+them; then the data is unpacked once more. The positions of the messages come from the data: a message that is missing
+or misplaced in the index would otherwise be skipped silently.
 """
 
 import heapq
@@ -29,14 +29,14 @@ from hpccd_ros.bag.mcap_records import (
     within_chunk_times,
 )
 
-# Bytes of messages, with what Python needs for each, that may wait for earlier ones of later chunks. Recorders write
-# messages nearly in order: what waits is about a chunk.
+# Bytes of messages, with Python's overhead, that may wait for earlier ones of later chunks. Recorders write messages
+# nearly in order: about a chunk waits.
 MOST_WAITING = 2 << 30
 _OF_A_MESSAGE = 400
 
 
 class _Waiting(NamedTuple):
-    """A message, or a place where messages are from `time` on. Equal times: in the order of the file."""
+    """A message, or a position with messages from `time` on. Equal times: in the order of the file."""
 
     time: int
     at: int
@@ -45,9 +45,9 @@ class _Waiting(NamedTuple):
 
 
 class McapFile:
-    """`stream` stays open while messages are read. Raises what is in mcap_records.DAMAGE; the methods too.
+    """`stream` stays open while messages are read. Raises the errors in mcap_records.DAMAGE; the methods too.
 
-    channels, schemas: by number. counts: number of a channel -> its messages, only for channels that have some.
+    channels, schemas: by number. counts: number of a channel -> number of its messages, if it has any.
     compression: that of the first chunk.
     """
 

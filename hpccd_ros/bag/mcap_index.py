@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The index of an MCAP file (its summary section), and whether the data is what it tells."""
+"""The index of an MCAP file (its summary section), and whether the data agrees with it."""
 
 import struct
 import zlib
@@ -20,7 +20,7 @@ _FOOTER = struct.Struct("<BQQQI")
 class Descriptions:
     """Schemas and channels by their numbers, from the index and from the data.
 
-    complain: takes a text for each that is described twice, differently; the later one counts.
+    complain: called with a text for each contradicting description; the later one counts.
     """
 
     def __init__(self, complain: Callable[[str], None]) -> None:
@@ -41,7 +41,7 @@ class Descriptions:
 
 
 def read_index(stream, size: int) -> tuple[Summary | None, int]:
-    """(index or None, where the data must end) of a file of `size` bytes. Raises what is in mcap_records.DAMAGE."""
+    """(index or None, where the data must end) of a file of `size` bytes. Raises the errors in mcap_records.DAMAGE."""
     footer_at = size - len(MCAP0_MAGIC) - _FOOTER.size
     if footer_at < len(MCAP0_MAGIC):
         raise McapError("no room for a footer")
@@ -88,9 +88,9 @@ def _summary(raws) -> Summary:
 
 
 def misplaced(summary: Summary, data: list[Place]) -> str | None:
-    """How the places that the index names are not those in the `data`, or None.
+    """How the positions in the index differ from those in the `data`, or None.
 
-    An index may name none of a kind at all.
+    An index may have no positions of a kind.
     """
     for opcode, name, indexed in (
         (Opcode.CHUNK, "chunk", [(i.chunk_start_offset, i.chunk_length) for i in summary.chunk_indexes]),
@@ -107,14 +107,14 @@ def misplaced(summary: Summary, data: list[Place]) -> str | None:
 def undescribed(summary: Summary, channels: Iterable[int]) -> str | None:
     """The first of the `channels` with messages that the index lacks, in words, or None.
 
-    An index may repeat no channels at all.
+    An index may have no channels.
     """
     missing = next((number for number in channels if summary.channels and number not in summary.channels), None)
     return None if missing is None else f"the index does not describe channel {missing}"
 
 
 def stored_counts(summary: Summary) -> dict[int, int] | None:
-    """Message counts by channel, only for channels that have some; None: the index has no counts."""
+    """Message counts by channel, for channels that have messages; None: the index has no counts."""
     statistics = summary.statistics
     if statistics is None or (statistics.message_count and not statistics.channel_message_counts):
         return None

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The records of an MCAP file, taken apart so that no length and no size in it is believed before it is checked.
+"""The records of an MCAP file, parsed so that no length or size is trusted before it is checked.
 
-The reader of the library `mcap` believes them: it reads on into the next record where a length is too large, takes what
-is there where the file ends, and unpacks whatever a chunk unpacks to.
+The reader of the library `mcap` trusts them: it reads into the next record if a length is too large, accepts partial
+data at the end of the file, and unpacks a chunk to any size.
 """
 
 import dataclasses
@@ -21,8 +21,8 @@ from mcap.opcode import Opcode
 from mcap.stream_reader import CRCValidationError
 from mcap.writer import MCAP0_MAGIC
 
-# What reading torn or flipped bytes can raise: the above, decompressors (lz4: RuntimeError), text that is no UTF-8 (a
-# ValueError), a disk that does not give its bytes.
+# Errors from reading truncated or flipped bytes: the above, decompressors (lz4: RuntimeError), text that is not UTF-8
+# (a ValueError), a disk that cannot be read.
 DAMAGE = (
     McapError,
     CRCValidationError,
@@ -34,7 +34,7 @@ DAMAGE = (
     MemoryError,
 )
 
-# Recorders close a chunk after about a megabyte, or after one message; DDS carries no message as large as this.
+# Recorders close a chunk after about a megabyte, or after one message; no DDS message is as large as this.
 MOST_UNPACKED = 1 << 30
 # A chunk of a megabyte has 34,000 of the smallest messages. Each costs a reader ten times its bytes.
 MOST_RECORDS = 1 << 20
@@ -62,7 +62,7 @@ _KINDS = {
 
 
 class Place(NamedTuple):
-    """Of a whole record in a file."""
+    """Position of a complete record in a file."""
 
     opcode: int
     at: int
@@ -70,7 +70,7 @@ class Place(NamedTuple):
 
 
 class Raw(NamedTuple):
-    """A whole record that is not looked into yet. at: its place in the file."""
+    """A complete record that is not parsed yet. at: its position in the file."""
 
     opcode: int
     at: int
@@ -82,7 +82,7 @@ class Raw(NamedTuple):
 
 
 def records(stream, begin: int, end: int) -> Iterator[Raw]:
-    """The records between two places of a file. Raises EndOfFile where one does not end within."""
+    """The records between two positions of a file. Raises EndOfFile if one does not end within."""
     stream.seek(begin)
     at = begin
     while at < end:
@@ -99,9 +99,9 @@ def records(stream, begin: int, end: int) -> Iterator[Raw]:
 
 
 def data_section(stream, size: int) -> Iterator[Raw]:
-    """The records of a file of `size` bytes up to its DataEnd, which comes last, its check sum found right.
+    """The records of a file of `size` bytes up to and including its DataEnd, whose checksum is verified.
 
-    Raises what is in DAMAGE.
+    Raises the errors in DAMAGE.
     """
     stream.seek(0)
     if (magic := stream.read(len(MCAP0_MAGIC))) != MCAP0_MAGIC:
@@ -122,7 +122,7 @@ def data_section(stream, size: int) -> Iterator[Raw]:
 
 
 def parse(raw: Raw) -> known.McapRecord | None:
-    """The record, or None where it is of a kind that is not needed here. Raises what is in DAMAGE."""
+    """The record, or None if its kind is not needed here. Raises the errors in DAMAGE."""
     if raw.opcode == Opcode.MESSAGE:
         return _message(raw.body)
     if raw.opcode == Opcode.MESSAGE_INDEX:
@@ -132,7 +132,7 @@ def parse(raw: Raw) -> known.McapRecord | None:
         return None
     record = kind.read(_Whole(raw.body))
     if isinstance(record, known.Attachment):
-        # All but its own four bytes, which the library skips.
+        # All except its own four bytes, which the library skips.
         stored, found = int.from_bytes(raw.body[-4:], "little"), zlib.crc32(raw.body[:-4])
         if stored not in (0, found):
             raise CRCValidationError(stored, found, record)
@@ -140,7 +140,7 @@ def parse(raw: Raw) -> known.McapRecord | None:
 
 
 def inside(chunk: known.Chunk) -> Iterator[known.Schema | known.Channel | known.Message]:
-    """The records of a chunk, its check sum found right. Raises what is in DAMAGE."""
+    """The records of a chunk, whose checksum is verified. Raises the errors in DAMAGE."""
     data = memoryview(_unpacked(chunk))
     at = 0
     for _ in range(MOST_RECORDS):
@@ -157,7 +157,7 @@ def inside(chunk: known.Chunk) -> Iterator[known.Schema | known.Channel | known.
 
 
 def within_chunk_times(chunk: known.Chunk, record: known.McapRecord) -> bool:
-    """Whether a record of the chunk is within the times that it tells, by which chunks are put into order."""
+    """Whether a record is within the times of its chunk, by which chunks are ordered."""
     inner = isinstance(record, known.Message)
     return not inner or chunk.message_start_time <= record.log_time <= chunk.message_end_time
 
@@ -180,7 +180,7 @@ def _unpacked(chunk) -> bytes:
     size = chunk.uncompressed_size
     if size > MOST_UNPACKED:
         raise McapError(f"a chunk of {size:,} bytes, more than {MOST_UNPACKED:,}")
-    # One byte more than it says is enough to see that it lies.
+    # One byte more than declared is enough to find that it is wrong.
     if chunk.compression == "zstd":
         with zstandard.ZstdDecompressor().stream_reader(chunk.data) as reader:
             data = reader.read(size + 1)
@@ -198,7 +198,7 @@ def _unpacked(chunk) -> bytes:
 
 
 def _check_message_index(body: bytes) -> None:
-    # Not needed here, but other readers fall over one that is not whole.
+    # Not needed here, but other readers fail on an incomplete one.
     entries = _INDEX_HEAD.unpack_from(body)[1]
     if entries % _INDEX_ENTRY or entries > len(body) - _INDEX_HEAD.size:
         raise EndOfFile(f"an index of messages of {entries:,} bytes, {len(body) - _INDEX_HEAD.size:,} are left")
@@ -210,7 +210,7 @@ def _message(body: bytes) -> known.Message:
 
 
 class _Whole(ReadDataStream):
-    """That of the library gives what is there."""
+    """A stream that raises at the end of the data; that of the library returns partial data."""
 
     def __init__(self, body: bytes):
         super().__init__(BytesIO(body))

@@ -9,15 +9,15 @@ from pathlib import Path
 
 from hpccd_ros.middleware.message_types import split_type_name
 
-# rosbag2's LocalMessageDefinitionSource separates a type from those it is made of by exactly this line.
+# rosbag2's LocalMessageDefinitionSource separates a type from the types of its fields by exactly this line.
 SEPARATOR = "=" * 80
 
 
 @functools.cache
 def definition_text(type_name: str) -> str:
-    """Full definition of `type_name` ("pkg/msg/Name"): its own text, then each type it is made of.
+    """Full definition of `type_name` ("pkg/msg/Name"): its own text, then the types of its fields.
 
-    Raises LookupError where the message package is not installed in this environment.
+    Raises LookupError if the message package is not installed.
     """
     own, *nested = _type_hashes(type_name)
     texts = [_message_file(own, ".msg").read_text(encoding="utf-8")]
@@ -29,7 +29,7 @@ def definition_text(type_name: str) -> str:
 
 
 def type_hash(type_name: str) -> str:
-    """The REP-2011 hash ("RIHS01_...") of `type_name`, the same that DDS endpoints of the type announce."""
+    """The REP-2011 hash ("RIHS01_...") of `type_name`, as announced by DDS endpoints of the type."""
     return _type_hashes(type_name)[type_name]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Quality of service of recorded topics, in the YAML form that rosbag2 (Jazzy, bag version 9) reads."""
+"""QoS of recorded topics, in the YAML form that rosbag2 (Jazzy, bag version 9) reads."""
 
 import yaml
 
@@ -10,13 +10,13 @@ INFINITE = {"sec": 9223372036, "nsec": 854775807}
 def offered_qos(profiles) -> list[dict]:
     """rosbag2 maps of the rclpy QoSProfile objects that the publishers of a topic offer, equal ones once.
 
-    rosbag2 refuses a map with a key missing, so every key is written. The deadline, lifespan and lease of a
+    rosbag2 rejects a map with a missing key, so every key is written. The deadline, lifespan and lease of a
     publisher are left unlimited: a player at another rate would break them.
     """
     maps = []
     for profile in profiles:
         entry = {
-            # Endpoint information does not carry history and depth over the wire (it says UNKNOWN, 0).
+            # Endpoint information does not contain history and depth (it has UNKNOWN, 0).
             "history": "keep_last",
             "depth": max(1, profile.depth),
             "reliability": profile.reliability.name.lower(),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Read recordings: one MCAP file, or a folder of them as rosbag2 and `hpccd record` write."""
+"""Reads recordings: one MCAP file, or a folder of them, as written by rosbag2 and `hpccd record`."""
 
 import contextlib
 import dataclasses
@@ -20,7 +20,7 @@ from hpccd_ros.base.quoting import listed, printable
 
 
 class RecordingError(UserError, ValueError):
-    """A recording cannot be read, or not used for what was asked; the text names the file and the remedy."""
+    """A recording cannot be read, or not used for the request; the text names the file and the remedy."""
 
     def __init__(self, text: str):
         super().__init__(printable(text))  # names in it are those of the recording
@@ -31,7 +31,7 @@ class RecordedTopic:
     name: str
     type_name: str  # "pkg/msg/Name"
     definition: str  # text of the recorded schema
-    type_hash: str  # "RIHS01_...", or "" where the recorder did not store it
+    type_hash: str  # "RIHS01_...", or "" if the recorder did not store it
     offered_qos: str  # rosbag2 YAML, or ""
     count: int
 
@@ -41,7 +41,7 @@ class RecordedMessage:
     topic: str
     log_time: int  # ns since the epoch, when the recorder received it
     publish_time: int  # ns since the epoch, when it was sent
-    sequence: int  # the publisher's number, 0 where the recorder did not store it
+    sequence: int  # the publisher's sequence number, 0 if the recorder did not store it
     data: bytes  # CDR, with its 4-byte header
 
 
@@ -58,11 +58,11 @@ class Recording:
 
     path: an `.mcap` file or a folder of them.
     Raises RecordingError if it does not exist, is not an MCAP file, is truncated or damaged, or has no ROS 2 messages;
-    so does `messages` for damage that only reading reveals.
+    so does `messages` for damage that is found while reading.
 
     topics: dict topic name -> RecordedTopic.
     skipped: topic name -> why its messages are not ROS 2 messages, and so are skipped.
-    info: what `hpccd record` stored about the node (dict), or None for other recorders.
+    info: data of `hpccd record` about the node (dict), or None for other recorders.
     attachments: name -> bytes of the attached files, such as mesh files.
     """
 
@@ -151,7 +151,7 @@ class Recording:
             except ValueError as error:
                 raise RecordingError(f"{path}: {error}") from error
             self.info = info if self.info is None else self.info
-        for attachment in file.attachments:  # what came to be needed later is in later files alone
+        for attachment in file.attachments:  # files that became necessary later are in later parts only
             self.attachments.setdefault(attachment.name, attachment.data)
         return file
 
@@ -196,7 +196,7 @@ def _foreign(channel, schema) -> str | None:
 
 
 def stored_info(record: Metadata) -> dict | None:
-    """What `hpccd record` stored about the node; None for other records. Raises ValueError if it cannot be read."""
+    """Data of `hpccd record` about the node; None for other records. Raises ValueError if it cannot be read."""
     if record.name != HPCCD_RECORD:
         return None
     try:
@@ -209,12 +209,12 @@ def stored_info(record: Metadata) -> dict | None:
 
 
 def recording_files(path: Path) -> list[Path]:
-    """The .mcap files of a recording, in order. Raises RecordingError where there is none, or something else."""
+    """The .mcap files of a recording, in order. Raises RecordingError if there is none, or something else."""
     files = _files_of_folder(path) if path.is_dir() else [path]
     for file in files:
         if not file.exists():
             raise RecordingError(f"{file} does not exist")
-        # Of a pipe, a device or a socket nothing may ever come, and nothing can be read twice.
+        # A pipe, device or socket may never return data, and cannot be read twice.
         if not file.is_file():
             raise RecordingError(f"{file} is no file that can be read again: copy the recording into one")
         _check_format(file)
@@ -261,7 +261,7 @@ def _split_number(path: Path):
 
 
 def check_ends(path: Path) -> None:
-    """Raise RecordingError where `path` does not begin as an MCAP file, or does not end as a finished one."""
+    """Raise RecordingError if `path` does not begin like an MCAP file, or does not end like a finished one."""
     try:
         with open(path, "rb") as stream:
             begin = stream.read(len(MCAP0_MAGIC))
@@ -283,7 +283,7 @@ def check_ends(path: Path) -> None:
 
 @contextlib.contextmanager
 def _explained(path):
-    """Turn what reading damaged bytes raises into one clear error."""
+    """Turn errors from damaged bytes into one clear error."""
     try:
         yield
     except DAMAGE as error:

@@ -21,18 +21,18 @@ class BagWriter:
     info: JSON-able dict, stored with each file for the replay (see `reader.Recording.info`).
     attachments: (name, bytes) of files that a replay needs, stored with each file too.
     compression: "none", "lz4" or "zstd", a chunk at a time.
-    chunk_size: bytes of messages after which a chunk is closed, indexed and handed to the system.
-    flush_interval: seconds after which an open chunk is closed all the same. A process killed at any moment
-    loses at most the messages of the open chunk, so at most those of the last `flush_interval`.
+    chunk_size: bytes of messages after which a chunk is closed, indexed and written.
+    flush_interval: seconds after which an open chunk is closed anyway. A process killed at any moment
+    loses at most the messages of the open chunk, those of the last `flush_interval`.
     max_bytes, max_seconds: split limits (0: none), for a folder only. `max_bytes` counts messages
-    before compression, and the last one of a file may pass it.
+    before compression, and the last one of a file may exceed it.
 
-    The constructor raises ValueError for options that do not fit each other, FileExistsError rather than overwrite
-    a recording, OSError where it cannot write. Later a disk that refuses (full, gone) raises nothing: the file ends
-    behind its last whole chunk, messages that come are counted, and after `retry_interval` seconds a new file is
-    tried: the next number of the folder, or NAME-1.mcap beside NAME.mcap.
+    The constructor raises ValueError for inconsistent options, FileExistsError instead of overwriting a recording,
+    OSError if it cannot write. Later errors of the disk (full, gone) are not raised: the file ends after its last
+    complete chunk, lost messages are counted, and after `retry_interval` seconds a new file is tried: the next number
+    of the folder, or NAME-1.mcap beside NAME.mcap.
 
-    write_errors, last_error: what the disk refused. not_written: messages by topic that are in no file.
+    write_errors, last_error: errors of the disk. not_written: messages by topic that are in no file.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class BagWriter:
         self._limits = (max_bytes, int(max_seconds * 1e9))
         self._topics: dict[str, Topic] = {}
         self._files: list[BagFile] = []
-        self._listed: list[tuple[str, str]] = []  # of the finished ones, their parts of metadata.yaml
+        self._listed: list[tuple[str, str]] = []  # parts of metadata.yaml of finished files
         self._file: BagFile | None = None  # None: after an error, until the next try
         self._try_again = 0.0
         self._closed = False
@@ -78,15 +78,15 @@ class BagWriter:
         self._open_file()
 
     def add_topic(self, topic: Topic) -> None:
-        """Announce a topic before its first message. Raises LookupError where its type is not installed."""
+        """Announce a topic before its first message. Raises LookupError if its type is not installed."""
         message_definitions.definition_text(topic.type_name)  # fail before anything is written
         self._topics[topic.name] = topic
         if self._file is not None:
             self._guarded(lambda: self._file.register(topic))
 
     def attach(self, name: str, data: bytes) -> bool:
-        """A file that a replay needs and that was not known at the start. One of this name stays as it is: False where
-        that has other content."""
+        """Add a file that a replay needs and that was not known at the start. An attachment with this name is not
+        replaced: False if its content differs."""
         for known, there in self._options["attachments"]:
             if name == known:
                 return there == data
@@ -103,7 +103,7 @@ class BagWriter:
             self._guarded(lambda: self._go_on(log_time, topic))
         elif self._file is not None and self._is_full(log_time):
             self._guarded(lambda: self._split(log_time, topic))
-        # What the error of a failing write loses, its file counts.
+        # The file counts messages that a failing write loses.
         if self._file is None:
             self.not_written[topic_name] += 1
         else:
@@ -116,7 +116,7 @@ class BagWriter:
             self.flush()
 
     def flush(self) -> None:
-        """Hand everything written so far to the operating system: it survives the death of this process."""
+        """Write everything so far, so that it survives the end of this process."""
         if self._file is not None:
             self._guarded(self._file.flush)
         self._flushed = time.monotonic()
@@ -129,7 +129,7 @@ class BagWriter:
 
     @property
     def failing(self) -> bool:
-        """Whether the disk refused the last try, so that messages are lost now."""
+        """Whether the last write failed, so that messages are being lost."""
         return self._file is None and not self._closed
 
     @property
@@ -138,7 +138,7 @@ class BagWriter:
 
     @property
     def flushed_count(self) -> int:
-        """Messages that survive the death of this process."""
+        """Messages that survive the end of this process."""
         return sum(file.message_count - file.open_chunk.total() for file in self._files)
 
     @property
@@ -147,16 +147,16 @@ class BagWriter:
 
     @property
     def torn_files(self) -> list[Path]:
-        """Files that an error ended before they were finished."""
+        """Files that were ended by an error."""
         return [file.path for file in self._files if not file.finished and file is not self._file]
 
     @property
     def size(self) -> int:
-        """Bytes handed to the system so far, over all files."""
+        """Bytes written so far, over all files."""
         return sum(file.size for file in self._files)
 
     def _guarded(self, action) -> None:
-        """Do `action` with the current file; where the disk refuses, count it and give the file up."""
+        """Do `action` with the current file; if the disk fails, count it and abandon the file."""
         try:
             action()
         except OSError as error:
@@ -192,8 +192,8 @@ class BagWriter:
 
     def _list_files(self):
         finished = [file for file in self._files if file.finished]
-        # Those before are rendered already: with all of them anew, each split takes longer than the one before, and the
-        # messages of a stream that goes on meanwhile are lost.
+        # Earlier ones are already rendered: rendering all of them again takes longer at each split, and messages of the
+        # stream would be lost meanwhile.
         for file in finished[len(self._listed) :]:
             parts = ([file.path.name], [metadata_of_file(file)])
             self._listed.append(tuple(textwrap.indent(qos_yaml.to_yaml(part), "  ") for part in parts))
@@ -202,14 +202,15 @@ class BagWriter:
         lists = f"  relative_file_paths:\n{names}  files:\n{files}"
         draft = self.path / "metadata.yaml.part"
         draft.write_text(qos_yaml.to_yaml(bag) + lists, encoding="utf-8")
-        os.replace(draft, self.path / "metadata.yaml")  # whole at any moment
+        os.replace(draft, self.path / "metadata.yaml")  # complete at any moment
 
     def _split(self, log_time, cause):
         self._close_file()
         self._go_on(log_time, cause)
 
     def _go_on(self, log_time, cause):
-        """Open the next file. It is complete alone: it starts with what is in force before the message of `cause`."""
+        """Open the next file. It is complete on its own: it starts with the messages in force before that of
+        `cause`."""
         self._open_file()
         for topic in self._topics.values():
             self._file.register(topic)
@@ -239,7 +240,7 @@ def unusable_options(path, compression: str, max_bytes: float, max_seconds: floa
 
 
 def free_path(path: Path) -> Path:
-    """`path`, or where it exists NAME-1, NAME-2, ... beside it: recordings are not overwritten."""
+    """`path`, or if it exists NAME-1, NAME-2, ... beside it: recordings are not overwritten."""
     candidate, number = path, 0
     while candidate.exists():
         number += 1
@@ -248,7 +249,7 @@ def free_path(path: Path) -> Path:
 
 
 def metadata_of_bag(files: list[BagFile], topics: list[Topic]) -> dict:
-    """All of it, of the given files."""
+    """rosbag2's metadata of the given files."""
     return metadata_without_files(files, topics) | {
         "relative_file_paths": [f.path.name for f in files],
         "files": [metadata_of_file(f) for f in files],
@@ -256,7 +257,7 @@ def metadata_of_bag(files: list[BagFile], topics: list[Topic]) -> dict:
 
 
 def metadata_of_file(file: BagFile) -> dict:
-    """What it says of one file."""
+    """Its entries about one file."""
     return {
         "path": file.path.name,
         "starting_time": {"nanoseconds_since_epoch": file.start},
@@ -266,7 +267,7 @@ def metadata_of_file(file: BagFile) -> dict:
 
 
 def metadata_without_files(files: list[BagFile], topics: list[Topic]) -> dict:
-    """All but its two lists of files."""
+    """The metadata without its two lists of files."""
     used = [f for f in files if f.message_count]
     start = min((f.start for f in used), default=0)
     end = max((f.end for f in used), default=0)

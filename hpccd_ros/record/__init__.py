@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From topics to a recording."""
+"""Records topics."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The files that a recording carries along: without them a replay elsewhere could not rebuild its scene."""
+"""Files attached to a recording: without them a replay elsewhere could not rebuild the scene."""
 
 import hashlib
 import itertools
@@ -15,14 +15,14 @@ from hpccd_ros.params import robot_parameters
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.xml_tree import decoded
 
-# Of a description: far more than robots have.
+# Limit for a description: far more than robots have.
 MOST_FILES = 1000
 
 Files = list[tuple[str, bytes]]
 
 
 def attachment_name(mesh: str, path: str) -> str:
-    """Name of the attachment with the file `path` of a mesh; its suffix tells the format."""
+    """Name of the attachment with the file `path` of a mesh; its suffix is the format."""
     return f"mesh/{mesh}/{Path(path).name}"
 
 
@@ -35,18 +35,18 @@ def semantics_name(robot: str) -> str:
 
 
 def link_mesh_name(robot: str, uri: str) -> str:
-    """Of a mesh file that the robot's description names."""
+    """Name of the attachment with a mesh file that the robot's description names."""
     return f"robot/{robot}/mesh/{_digest(uri)}/{Path(uri).name}"
 
 
 def changed_link_mesh_name(name: str, description: str) -> str:
-    """In place of the ``name`` of a mesh file, where it was another file when an earlier description named it."""
+    """Replaces the ``name`` of a mesh file that has changed since an earlier description named it."""
     folder, _, file = name.rpartition("/")
     return f"{folder}/{_digest(description)}/{file}"
 
 
 def files(parameters: dict) -> tuple[Files, list[str]]:
-    """([(attachment name, content)] of the files that the node's parameters name, [what could not be read])."""
+    """([(attachment name, content)] of the files that the node's parameters name, [errors of unreadable ones])."""
     found: Files = []
     missing: list[str] = []
     for mesh in parameters["meshes"] or []:  # None: never set
@@ -66,7 +66,7 @@ def files(parameters: dict) -> tuple[Files, list[str]]:
 
 
 def _named_by(robot: str, values: Mapping[str, Any], data: bytes) -> tuple[Files, list[str]]:
-    """`link_meshes` of the description in a file."""
+    """`link_meshes` for the description in a file."""
     try:
         return link_meshes(robot, values, decoded(data))
     except RobotError:
@@ -74,7 +74,7 @@ def _named_by(robot: str, values: Mapping[str, Any], data: bytes) -> tuple[Files
 
 
 def link_meshes(robot: str, values: Mapping[str, Any], text: str) -> tuple[Files, list[str]]:
-    """As `files`, of those that the description ``text`` names. values: parameters robot.NAME.*."""
+    """As `files`, for the files that the description ``text`` names. values: parameters robot.NAME.*."""
     found: Files = []
     missing: list[str] = []
     path = values["description"]
@@ -88,7 +88,7 @@ def link_meshes(robot: str, values: Mapping[str, Any], text: str) -> tuple[Files
             missing.append(f"robot {robot} names more than {MOST_FILES} mesh files: only these are in the recording")
             break
         try:
-            file = str(existing(find(uri)))  # of a stranger's description: nothing but meshes, and no devices
+            file = str(existing(find(uri)))  # in an untrusted description: only mesh files, no devices
         except MeshFileError as error:
             missing.append(_missing(f"mesh file {shortened(uri)}", error))
             continue

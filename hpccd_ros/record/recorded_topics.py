@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which topics a recording of a node holds, the quality of service to ask of each, and what the recording says of the
-node: a replay needs nothing else. A shape that was sent before the recording began cannot be computed again."""
+"""Topics in the recording of a node, the QoS to request for each, and the data about the node that a replay needs. A
+shape that was sent before the recording began is missing."""
 
 import dataclasses
 from collections.abc import Callable, Mapping
@@ -34,7 +34,7 @@ POSITIONS = {
     topic_names.MARKER: MARKER,
     topic_names.POSE: POSE,
 }
-# Relative name -> type of what the node computes.
+# Relative name -> type of results of the node.
 ANSWERS = {topic_names.CONTACTS: CONTACTS, topic_names.DISTANCES: DISTANCES, topic_names.PAIRS: PAIRS}
 
 
@@ -42,8 +42,8 @@ ANSWERS = {topic_names.CONTACTS: CONTACTS, topic_names.DISTANCES: DISTANCES, top
 class Wanted:
     """A topic to record: `name` relative or absolute, `type_name` "pkg/msg/Name".
 
-    `latched`: of a transient local topic, how many of its last messages are in force at any time; else 0.
-    `kept`: the same of a topic that is not transient local, but whose messages hold until the next one.
+    `latched`: for a transient local topic, the number of its last messages that are in force; else 0. `kept`: the same
+    for a topic that is not transient local, but whose messages are in force until the next one.
     """
 
     name: str
@@ -74,12 +74,13 @@ def of_node(parameters: dict) -> list[Wanted]:
     described = dict.fromkeys(robot_parameters.topics(robots).values())
     wanted += [Wanted(topic, DESCRIPTION, latched=1) for topic in described]
     wanted += [Wanted(topic, JOINT_STATES) for topic in robot_parameters.joint_topics(robots)]
-    # Distances and summaries whether they are asked for now or not: they may be at any time.
+    # Distances and summaries too: they may be switched on at any time.
     return [*wanted, *(Wanted(name, type_name) for name, type_name in ANSWERS.items())]
 
 
 def types_by_role(meshes, robots: RobotValues) -> dict[str, str]:
-    """Relative name -> type of all topics from which a node of these meshes and robots can be computed again."""
+    """Relative name -> type of all topics from which the results of a node with these meshes and robots can be
+    computed."""
     of_mesh = {topic_names.TOPOLOGY: TOPOLOGY, **POSITIONS}
     return {
         **{topic_names.of_mesh(mesh, kind): type_name for mesh in meshes for kind, type_name in of_mesh.items()},
@@ -91,10 +92,10 @@ def types_by_role(meshes, robots: RobotValues) -> dict[str, str]:
 
 
 def subscription_qos(node, name: str, topic: Wanted, depth: int) -> QoSProfile:
-    """What to ask of the publishers of `topic` (`name`: resolved), so that all that others receive is received here.
+    """The QoS to request for `topic` (`name`: resolved) to receive everything that other subscribers receive.
 
-    A reader that asks for more than a writer offers is not served at all. So ask for what is offered by those
-    publishers that are there, else for what other readers of the topic ask, else for reliable delivery.
+    A reader that requests more than a writer offers receives nothing. So request the QoS that existing publishers
+    offer, or else what other readers of the topic request, or else reliable delivery.
     """
     offers = [p.qos_profile.reliability for p in node.get_publishers_info_by_topic(name)]
     asked = [s.qos_profile.reliability for s in node.get_subscriptions_info_by_topic(name)]
@@ -102,8 +103,8 @@ def subscription_qos(node, name: str, topic: Wanted, depth: int) -> QoSProfile:
 
 
 def as_node_asks(node, name: str, topic: Wanted, depth: int, *, recorded, vertices: ReliabilityPolicy) -> QoSProfile:
-    """For the own recording of the node `recorded`. vertices: what it asks of them and of joint states; the others are
-    reliable, unless parameters of the node (qos_overrides) say otherwise.
+    """The QoS for the own recording of the node `recorded`. vertices: that of vertices and joint states; other topics
+    are reliable, unless parameters of the node (qos_overrides) change it.
     """
     default = vertices if topic.type_name in (*POSITIONS.values(), JOINT_STATES) else ReliabilityPolicy.RELIABLE
     entity = "publisher" if topic.type_name in ANSWERS.values() else "subscription"
@@ -122,13 +123,13 @@ def recording_info(node: str, parameters: dict, wanted: list[Wanted], resolve: C
         "hpccd": package_version(),
         "node": node,
         "parameters": parameters,
-        # The role of each topic, whatever it was remapped to.
+        # The role of each topic, independent of remappings.
         "topics": {resolve(topic.name): topic.name for topic in wanted},
     }
 
 
 def missing_shapes(parameters: dict, resolve: Callable[[str], str], received: Mapping[str, int]) -> list[str]:
-    """One sentence for each mesh that has moved, or was needed for an answer, and whose shape is not there.
+    """One sentence for each mesh that has moved, or was needed for a result, and whose shape is missing.
 
     parameters: of the recorded node, {full name: value}. resolve: relative -> absolute name of a topic. received:
     messages so far, by absolute name.
@@ -146,7 +147,7 @@ def missing_shapes(parameters: dict, resolve: Callable[[str], str], received: Ma
 
 
 def _missing(mesh: str, parameters: dict, came: Callable[[str], bool]) -> list[str]:
-    """Topics of ``mesh`` on which its shape should have come."""
+    """Topics of ``mesh`` on which its shape should have arrived."""
     given_as = parameters.get(f"mesh.{mesh}.input") or topic_names.VERTICES
     if parameters.get(f"mesh.{mesh}.file") or given_as in topic_names.WHOLE:
         return []

@@ -18,7 +18,7 @@ from hpccd_ros.record import attachments, recorded_topics
 from hpccd_ros.record.recorded_topics import Wanted, missing_shapes, recording_info
 from hpccd_ros.record.topic_recorder import DescribedRobots, Recorder
 
-# s. Long enough for a shape that is sent with the first pose; soon enough to begin again.
+# Seconds: long enough for a shape that is sent with the first pose, and early enough to start again.
 LOOK_EVERY = 5.0
 
 
@@ -35,7 +35,7 @@ def _record_until(stop, target, args) -> int:
     namespace, _, name = args.node.rpartition("/")
     if not name or not args.node.startswith("/"):
         raise UserError(f"--node {args.node}: give the full name with its namespace, for example /hpccd")
-    # In the namespace of the recorded node, relative names and remappings mean the same as there.
+    # In the namespace of the recorded node, so that relative names and remappings mean the same.
     node = rclpy.create_node(f"{name}_recorder", namespace=namespace or "/", start_parameter_services=False)
     try:
         return _record(node, target, args, stop)
@@ -93,7 +93,7 @@ def _spin(node, recorder, bag, contacts, args, stop, missing):
         bag.poll()
         if not ready and recorder.publishers(contacts):
             ready = True
-            # Read by programs that start a recorder and must not publish before it listens.
+            # Read by programs that start a recorder and must not publish before it subscribes.
             print(f"recording {args.node} into {bag.path}: {len(recorder.topics)} topics, Ctrl-C ends", flush=True)
         status.update()
         if not warned and time.monotonic() >= look + LOOK_EVERY:
@@ -112,7 +112,7 @@ def _spin(node, recorder, bag, contacts, args, stop, missing):
 
 
 class Status:
-    """One line on the terminal that tells how the recording goes; nothing where the output is not a terminal."""
+    """A status line on the terminal; nothing if the output is not a terminal."""
 
     PERIOD = 0.5  # s
 

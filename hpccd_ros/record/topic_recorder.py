@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write the messages of topics into a recording, by raw subscriptions, so that it holds the bytes that were sent; and
-the mesh files of robots whose description comes on a topic: which they need is known only then."""
+"""Writes the messages of topics into a recording, by raw subscriptions, so that it contains the bytes that were sent;
+and the mesh files of robots whose description comes on a topic, because they are known only then."""
 
 import time
 from collections.abc import Callable
@@ -20,8 +20,8 @@ from hpccd_ros.record.recorded_topics import Wanted
 class Recorder:
     """Subscribes to the wanted topics through `node` and writes every message to `bag` until told to stop.
 
-    received: messages so far, by resolved topic name. lost: messages that did not get here, by topic, found by gaps
-    in the numbers that a topic's publisher counts (known where it has one publisher only).
+    received: messages so far, by resolved topic name. lost: messages that did not arrive, by topic, found by gaps in
+    the publisher's sequence numbers (for topics with one publisher).
     """
 
     def __init__(self, node, bag: BagWriter, wanted: list[Wanted], depth: int, qos_of=recorded_topics.subscription_qos):
@@ -29,7 +29,7 @@ class Recorder:
         self._bag = bag
         self.received: dict[str, int] = {}
         self.lost: dict[str, int] = {}
-        self.taken = 0  # messages handed over by the middleware, those after the end too
+        self.taken = 0  # messages from the middleware, including those after the end
         self._end: int | None = None
         self._sequence: dict[str, int] = {}
         self._subscriptions = {}
@@ -50,11 +50,11 @@ class Recorder:
         return self._subscriptions[topic].get_publisher_count()
 
     def end(self) -> None:
-        """From now on take only what had arrived before: it belongs to the recording, what comes later does not."""
+        """From now on take only messages that had arrived before; later ones do not belong to the recording."""
         self._end = time.time_ns()
 
     def finish(self, executor, depth: int) -> None:
-        """`end`, and take through `executor` what has arrived but waits: at most `depth` messages of each topic."""
+        """`end`, and take waiting messages through `executor`: at most `depth` of each topic."""
         self.end()
         most = self.taken + depth * len(self.topics)
         taken = -1
@@ -80,7 +80,7 @@ class Recorder:
 
     def _offered_qos(self, name):
         offers = [p.qos_profile for p in self._node.get_publishers_info_by_topic(name)]
-        # A publisher that sent and left at once is not listed any more: what was asked of it, it offered.
+        # A publisher that sent and left at once is no longer listed: it offered what was requested.
         return qos_yaml.offered_qos(offers or [self._subscriptions[name].qos_profile])
 
     def _watch_for_loss(self, name, sequence):
@@ -90,20 +90,20 @@ class Recorder:
             self.lost[name] = self.lost.get(name, 0) + sequence - last - 1
 
 
-# Anybody may publish descriptions: bound what they can make a recorder read and keep, of one robot.
+# Anyone may publish descriptions: limit the memory and files of one robot.
 MOST_READ = 100
 
 
 class DescribedRobots:
-    """Attaches to ``bag`` what descriptions name that `node` hears, of each robot the first MOST_READ. parameters: of
-    the recorded node. resolve: relative -> absolute topic name. warn: takes what could not be read."""
+    """Attaches to ``bag`` the files named by descriptions that `node` receives, for each robot the first MOST_READ.
+    parameters: of the recorded node. resolve: relative -> absolute topic name. warn: called for unreadable files."""
 
     def __init__(
         self, node: Node, bag: BagWriter, parameters: dict, resolve: Callable[[str], str], warn: Callable[[str], object]
     ) -> None:
         self._bag = bag
         self._warn = warn
-        self._logged: set[str] = set()  # bounded, as what is read is
+        self._logged: set[str] = set()  # bounded, because reading is
         for robot, values in robot_parameters.of(parameters).items():
             if robot_parameters.comes_on_topic(values["description"]):
                 topic = resolve(values["description"])

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a recording to contacts, or back to topics."""
+"""Computes the contacts of a recording again, or publishes its topics."""

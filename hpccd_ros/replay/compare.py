@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a recorded answer of the node and the contacts computed again differ first, in words."""
+"""The first difference between a recorded result of the node and the contacts computed again, in words."""
 
 import numpy as np
 
@@ -13,12 +13,12 @@ from hpccd_ros.middleware.answer_fields import read_bounds, read_separation
 def difference(
     recorded, contacts, layout: Layout, any_one: bool = False, bounds: MotionBounds = NO_BOUNDS
 ) -> str | None:
-    """None where `recorded` (ContactArray) holds just what `contacts` (of the core) and `bounds` would be sent as.
+    """None if `recorded` (ContactArray) is the message that the node would send for `contacts` (of the core) and
+    `bounds`.
 
-    Compared bit for bit: pairs, times, their order, totals, first time and hash. Points, normals and nearest
-    points are derived from these and not compared. any_one: the node stopped at the first contact found (report "any"),
-    which depends on the timing of its threads: there must be one if there is any, and it must be one of `contacts`,
-    which are all.
+    Pairs, times, their order, totals, first time and hash must be bit-identical. Points, normals and nearest points are
+    derived from these and not compared. any_one: the node stopped at the first contact found (report "any"), which
+    depends on the timing of its threads: there must be one if there is any, and it must be one of all `contacts`.
     """
     total = len(contacts.vf) + len(contacts.ee)
     then, now = list(recorded.topology_versions), list(layout.topology_versions)
@@ -91,7 +91,8 @@ def _malformed(message, layout) -> str | None:
 
 
 def _misnamed(message, side, of_vertex_face, kind, layout) -> str | None:
-    """What a side names that is not there: added up to numbers of the scene, it could pass for something else."""
+    """Names of meshes or features that do not exist. Converted to scene-wide indices, they could be mistaken for
+    others."""
     mesh = np.frombuffer(getattr(message, f"mesh_{side}"), np.uint32)
     feature = np.frombuffer(getattr(message, f"features_{side}"), np.uint32).reshape(-1, 2)
     if (mesh >= len(layout.mesh_names)).any():
@@ -139,7 +140,7 @@ def _explain(index, then, now, kind, describe) -> str:
     if index < len(pairs) and index < len(other) and tuple(pairs[index]) == tuple(other[index]):
         times = f"recorded at t = {float(toc[index])!r}, now at t = {float(other_toc[index])!r}"
         return f"{describe(pairs[index])}: {times}"
-    # Pairs are sorted: of two different ones at the same place, the smaller is missing on the other side.
+    # Pairs are sorted: of two different ones at the same position, the smaller is missing on the other side.
     if index >= len(other) or (index < len(pairs) and tuple(pairs[index]) < tuple(other[index])):
         return f"{describe(pairs[index])}: recorded at t = {float(toc[index])!r}, now not found"
     return f"{describe(other[index])}: found now at t = {float(other_toc[index])!r}, not recorded"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The smallest distances that the node told (topic distances), computed again."""
+"""Recorded smallest distances (topic distances), computed again."""
 
 import dataclasses
 from collections import defaultdict
@@ -20,7 +20,7 @@ from hpccd_ros.replay.frames import PATIENCE, FrameWindow
 from hpccd_ros.replay.input_order import OrderedAnswer
 
 # Fields of DistanceArray, and how many entries each has for a pair of meshes.
-# Not approach_speed: the snapshot before may be one that the recording does not hold.
+# Not approach_speed: the recording may lack the previous snapshot.
 _PER_PAIR = {
     "mesh_a": 1,
     "mesh_b": 1,
@@ -31,15 +31,15 @@ _PER_PAIR = {
     "points": 6,
     "direction": 3,
 }
-# Empty where the recording is older than the field.
+# Empty if the recording is older than the field.
 _LATER = ("direction",)
 
 
 class DistanceCheck:
-    """Compares each answer with the snapshot that it is of, bit for bit. accuracy: "": that of each answer.
+    """Compares each result with its snapshot; they must be bit-identical. accuracy: "": that of each result.
 
-    topics: to be read. verified, diverged, unverified: answers so far; first: what is wrong with the first of the
-    diverged, or else of the unverified ones, in words. Those of before the recording began are not counted.
+    topics: to read. verified, diverged, unverified: results so far; first: the first difference, or else the first
+    reason for which one is not verified, in words. Results from before the recording are not counted.
     """
 
     def __init__(self, topic: RecordedTopic | None, detector: StepDetector, accuracy: str) -> None:
@@ -58,7 +58,7 @@ class DistanceCheck:
         return self._divergence or self._lack
 
     def put(self, message, frames: int) -> None:
-        """An answer, after so many frames: it may have been written before the last of its positions."""
+        """Add a result, after this number of frames: it may have been written before the last of its positions."""
         self._waiting.append((frames, self.decode(message)))
 
     def put_of(self, step: OrderedAnswer | None, message, counts: bool) -> None:
@@ -76,7 +76,8 @@ class DistanceCheck:
             self._settled.pop(step, None)
 
     def settle_of(self, step: OrderedAnswer, frame: SceneFrame | None, counts: bool) -> None:
-        """It is now known whether there is a frame at the end of this step. counts: it began within the recording."""
+        """Call it when it is known whether there is a frame at the end of this step. counts: it began within the
+        recording."""
         self._settled[step] = frame, counts
         for answer in self._beside.pop(step, ()):
             self._look_beside(answer, step)
@@ -91,7 +92,7 @@ class DistanceCheck:
             self._lacks(f"distances at {step.end} ns: their frame is not certain")
 
     def settle(self, window: FrameWindow, frames: int | None = None) -> None:
-        """Look at what waits, of which the frame is there or will not come any more. frames: so far; None: all."""
+        """Compare waiting results whose frame exists or can no longer arrive. frames: so far; None: all."""
         still = []
         for came, answer in self._waiting:
             try:
@@ -136,7 +137,7 @@ class DistanceCheck:
 
 
 def difference(recorded, now) -> str | None:
-    """None where two DistanceArrays tell the same of the same meshes, bit for bit; else the first difference."""
+    """None if two DistanceArrays of the same meshes are bit-identical; else the first difference."""
     for name in ("mesh_names", "topology_versions"):
         if list(getattr(recorded, name)) != list(getattr(now, name)):
             return f"{name} {list(getattr(recorded, name))} were recorded, now they are {list(getattr(now, name))}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`hpccd doctor`: say in words what an examination of a recording found."""
+"""`hpccd doctor`: reports the result of an examination of a recording."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,9 +12,9 @@ from hpccd_ros.base.quoting import printable
 
 
 def main(args) -> int:
-    """Examine, and recover where asked. 0: sound or recovered, 1: damaged.
+    """Examine, and recover if requested. 0: sound or recovered, 1: damaged.
 
-    Raises UserError where nothing can be saved.
+    Raises UserError if nothing can be saved.
     """
     files = recording_files(Path(args.file))
     if args.recover:

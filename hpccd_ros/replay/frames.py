@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From recorded messages to frames of the scene, by the node's own rules."""
+"""Makes frames of the scene from recorded messages, with the node's rules."""
 
 from collections import OrderedDict, deque
 
@@ -17,15 +17,15 @@ from hpccd_ros.params import robot_parameters, scene_parameters
 from hpccd_ros.params.table import ROBOT
 from hpccd_ros.replay.recorded_setup import ReplaySetup
 
-# Frames for which an answer waits that was written before its own; far less than the window, which must still hold
-# the frames of the answers behind it.
+# Frames for which a result waits that was written before its own; far fewer than in the window, which must still
+# contain the frames of later results.
 PATIENCE = 16
 
 
 class FrameSource:
     """Pushes recorded messages into a pipeline like that of the node.
 
-    ordered: they arrive in the order in which the node took them. refused: messages refused, by reason, counted as in
+    ordered: they arrive in the order in which the node took them. refused: rejected messages, by reason, counted as in
     the node; transforms by topic.
     """
 
@@ -47,7 +47,7 @@ class FrameSource:
         return list(self._decoders)
 
     def listed_name(self, topic: str) -> str:
-        """The name of a recorded topic in the lists of answers."""
+        """The name of a recorded topic in the lists of results."""
         mesh, kind = self._setup.roles[topic]
         return topic_names.of_mesh(mesh, kind) if mesh else kind
 
@@ -61,7 +61,7 @@ class FrameSource:
         self._listen()
 
     def push(self, message, flags: int | None = None) -> list[SceneFrame]:
-        """Frames that this recorded message completes. flags: those that the node listed; None: it listed none."""
+        """Frames that this recorded message completes. flags: those in the node's list; None: there is no list."""
         mesh, kind = self._setup.roles[message.topic]
         decoded = self._decoders[message.topic](message)
         if kind in transform_topics.ALL:
@@ -76,7 +76,7 @@ class FrameSource:
         return self._counted(outcome)
 
     def happen(self, event: str, value: int) -> list[SceneFrame]:
-        """Apply an event listed by an answer; returns frames that it completes. Raises ValueError if it is unknown."""
+        """Apply an event listed by a result; returns frames that it completes. Raises ValueError if it is unknown."""
         outcome = Outcome()
         if event == taken_inputs.STOPPED:
             outcome = self._pipeline.stop()
@@ -110,7 +110,7 @@ class FrameSource:
         self._recent = {topic: deque(maxlen=joint_messages.MOST_RECENT) for topic in self._by_joints}
 
     def _set_robots(self, names: list[str]) -> Outcome:
-        """A description was received: do the same as StreamDetection.remake."""
+        """Apply a received description like StreamDetection.remake."""
         before = self._pipeline
         self._make(names)
         outcome = self._pipeline.inherit(before, self._setup.meshes)
@@ -128,7 +128,7 @@ class FrameSource:
 
     def _push_mesh(self, mesh, kind, decoded, message, flags) -> Outcome:
         watch = self._watches[message.topic]
-        # Sequence 0: the recorder was not told the publisher's numbers.
+        # Sequence 0: the recorder did not know the publisher's numbers.
         new_publisher = bool(message.sequence) and watch.next(message.sequence)[1]
         several = bool((flags or 0) & SEVERAL_PUBLISHERS)
         try:
@@ -157,7 +157,7 @@ class FrameSource:
 
 
 class FrameWindow:
-    """The last frames, by stamp: answers name the two frames between which they were found."""
+    """The last frames, by stamp: a result names the two frames of its step."""
 
     def __init__(self, capacity: int):
         self._capacity = capacity

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recorded messages in the order in which the node took them, according to the lists in its answers.
+"""Recorded messages in the order in which the node took them, according to the lists in its results.
 
-A first pass over the recording reads the lists and determines the order. The second pass then holds back only messages
-that reached the recorder earlier than the node. The node did not take messages that no answer lists, with one
-exception: if the lists begin late, or answers are missing in between, messages sent until then are taken in the order
-of the recording.
+A first pass over the recording reads the lists and determines the order. The second pass then delays only messages that
+reached the recorder earlier than the node. The node did not take messages that no result lists, with one exception: if
+the lists begin late, or results are missing in between, messages sent until then are taken in the order of the
+recording.
 """
 
 from array import array
@@ -28,11 +28,11 @@ from hpccd_ros.replay.frames import FrameSource
 _LATEST = 2**63 - 1  # recordings may have later times, lists cannot
 _NOT_LISTED = -1
 
-Key = tuple[str, int]  # of a message: its topic as the node names it, and when it was sent
+Key = tuple[str, int]  # key of a message: its topic as the node names it, and when it was sent
 
 
 class _FrameKey(NamedTuple):
-    """``inputs``: number that the node had taken; _NOT_LISTED: unknown, but before those that answers list."""
+    """``inputs``: number that the node had taken; _NOT_LISTED: unknown, but before those that results list."""
 
     session: int
     inputs: int
@@ -41,14 +41,14 @@ class _FrameKey(NamedTuple):
 
 @dataclass(eq=False)
 class OrderedAnswer:
-    """What is known about an answer before anything is computed.
+    """Properties of a result before anything is computed.
 
     ``sent``, ``start``, ``end``: ns. ``problem``: why it cannot be verified, or "". ``listed``: None: it has no list.
     ``session``: how often the node had been configured before, or its process started. ``begun``: inputs of the session
-    taken before those that answers list without a gap up to this one. ``unlisted``: messages to take before its list.
+    taken before those that results list without a gap up to this one. ``unlisted``: messages to take before its list.
     ``missing``: the first input of its list that the recording lacks, in words; ``early``: all that it lacks were sent
     before the first recorded message of their topic. ``answered``: all inputs of its list have been pushed.
-    ``distances``: answers about distances for its frame that have not been read.
+    ``distances``: results about distances for its frame that have not been read.
     """
 
     sent: int
@@ -80,10 +80,10 @@ class OrderedAnswer:
 class InputOrder:
     """Reads ``recording`` once; then give it the recorded inputs (`put`), and let it push them into ``source``.
 
-    contacts: name of the topic of answers; distances: of answers about distances, or None. decode: topic -> decoder,
-    for both. ``answers``: in the order of the recording; ``of_distances``: for each answer about distances the answer
-    about the same frame, or None. ``made``: frames so far. ``not_taken``: topic -> number of messages that the node did
-    not take although it took later ones.
+    contacts: name of the topic of results; distances: of results about distances, or None. decode: topic -> decoder,
+    for both. ``answers``: results in the order of the recording; ``of_distances``: for each result about distances the
+    result about the same frame, or None. ``made``: frames so far. ``not_taken``: topic -> number of messages that the
+    node did not take although it took later ones.
     """
 
     def __init__(
@@ -153,7 +153,7 @@ class InputOrder:
         """Determine sessions, messages taken without being listed, and how often each message is taken."""
         runs = self._runs()
         listed: dict[str, list[NDArray[np.int64]]] = defaultdict(list)
-        spans = []  # for each run: topic -> first and last time listed
+        spans = []  # of each run: topic -> first and last time listed
         for run in runs:
             times: dict[str, list[NDArray[np.int64]]] = defaultdict(list)
             for answer in run:
@@ -194,7 +194,7 @@ class InputOrder:
                 self.not_taken[name] = int(left.sum())
 
     def _runs(self) -> list[list[OrderedAnswer]]:
-        """Runs of answers whose lists continue each other without a gap."""
+        """Runs of results whose lists continue each other without a gap."""
         runs: list[list[OrderedAnswer]] = []
         session = taken = begun = 0
         for answer in self.answers:
@@ -205,7 +205,7 @@ class InputOrder:
                 if runs and not before:
                     session += 1
                 elif runs and before < taken:
-                    # A node that was configured again begins its lists at 0. Either its first answer was lost, or a
+                    # A node that was configured again begins its lists at 0. Either its first result was lost, or a
                     # list is wrong; in no case did this list begin before the recording.
                     answer.problem = answer.problem or "its list does not continue that of the previous answer"
                 begun = before
@@ -215,8 +215,8 @@ class InputOrder:
         return runs
 
     def _nearest(self, about_distances: list[OrderedAnswer]) -> list[OrderedAnswer | None]:
-        """For each answer about distances the answer about the same frame that was sent with it, or None if that is not
-        recorded, even if an answer to another frame with the same stamp is."""
+        """For each result about distances the result about the same frame that was sent with it, or None if that is not
+        recorded, even if a result for another frame with the same stamp is."""
         alike: dict[tuple[int, int], list[OrderedAnswer]] = defaultdict(list)
         for answer in self.answers:
             if not answer.problem:

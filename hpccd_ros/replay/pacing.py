@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rhythm in which a recording is played or replayed: at a rate, or one frame at each Enter."""
+"""The pace at which a recording is played or replayed: at a rate, or one frame at each Enter."""
 
 import time
 
@@ -14,14 +14,14 @@ def next_wanted(where: str) -> bool:
 
 
 class Pace:
-    """rate: speed, 1: as recorded, 0: without pauses. stop: filled (true) when it should no longer wait."""
+    """rate: speed, 1: as recorded, 0: without pauses. stop: becomes true when it should no longer wait."""
 
     def __init__(self, rate: float, stop=()):
         self._rate, self._stop = rate, stop
         self._began = self._first = None
 
     def wait(self, at: float) -> None:
-        """Return when it is time for what was recorded at `at` seconds; at once for the first."""
+        """Return when the message recorded at `at` seconds is due; at once for the first."""
         if not self._rate:
             return
         if self._began is None:
@@ -31,6 +31,6 @@ class Pace:
             time.sleep(min(left, 0.1))
 
     def delay(self, seconds: float) -> None:
-        """All that follows comes so much later."""
+        """Delay all later messages by this."""
         if self._began is not None:
             self._began += seconds

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Play recorded messages over DDS: the very bytes, with the recorded quality of service, in their rhythm.
+"""Publishes recorded messages over DDS: the recorded bytes, with the recorded QoS, at the recorded pace.
 
-A topic that was recorded with another definition of its type is refused: readers would misread its bytes.
+A topic that was recorded with another definition of its type is rejected: readers would misread its bytes.
 """
 
 import itertools
@@ -24,13 +24,13 @@ from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.pacing import Pace, next_wanted
 
-# Reliable readers that are late now and then must still find what they missed.
+# Reliable readers that are late must still receive what they missed.
 DEPTH = 20
-# Characters of YAML: rosbag2 writes 400 for a publisher.
+# Characters of YAML: rosbag2 writes 400 per publisher.
 MOST_QOS = 100_000
-# Seconds that the last messages may take on their way.
+# Seconds that the last messages may take to arrive.
 LAST = 2.0
-# Seconds of waiting from which on it is told what for.
+# Seconds of waiting after which the reason is shown.
 TOLD_AFTER = 1.0
 
 
@@ -69,13 +69,13 @@ def _topics(recording, args) -> list[RecordedTopic]:
 def _publisher(node, topic):
     try:
         return node.create_publisher(checked_type(topic), topic.name, _qos(topic))
-    # ValueError: no name of a topic. RuntimeError, as RCLError is: that of another one already, once it is resolved.
+    # ValueError: no topic name. RuntimeError, such as RCLError: once resolved, the name of another one.
     except (LookupError, NameValidationException, ValueError, RuntimeError) as error:
         raise RecordingError(f"topic {topic.name} cannot be played: {error}") from error
 
 
 def _qos(topic) -> QoSProfile:
-    """The recorded reliability and durability where all its publishers agreed, else reliable and volatile."""
+    """The recorded reliability and durability if all publishers agreed, else reliable and volatile."""
     offers = _offers(topic)
     # rosbag2 before version 9 wrote the numbers of the enumeration: 1 reliable, 2 best effort; 1 transient local.
     best_effort = offers and all(offer.get("reliability") in ("best_effort", 2) for offer in offers)
@@ -88,7 +88,7 @@ def _offers(topic) -> list[dict]:
         if len(topic.offered_qos) > MOST_QOS:
             raise ValueError("too long")
         offers = yaml.safe_load(topic.offered_qos) or []
-    except (yaml.YAMLError, ValueError, RecursionError):  # ValueError: what YAML takes for a date and is none
+    except (yaml.YAMLError, ValueError, RecursionError):  # ValueError: something that YAML reads as an invalid date
         offers = None
     if not isinstance(offers, list) or not all(isinstance(offer, dict) for offer in offers):
         why = "its quality of service is not stored as rosbag2 does"
@@ -97,7 +97,7 @@ def _offers(topic) -> list[dict]:
 
 
 def _in_force(topic) -> int:
-    """How many of the last messages of a latched topic are in force: static transforms add up."""
+    """Number of the last messages of a latched topic that are in force: static transforms accumulate."""
     return qos.TRANSFORMS_STATIC.depth if topic.type_name in transform_topics.TYPES else 1
 
 
@@ -118,7 +118,7 @@ def _await_subscribers(publishers, args, stop) -> dict[str, int]:
 
 
 def _await_arrival(publishers, topics, args, stop) -> float:
-    """How long the last messages of these topics took to arrive, s."""
+    """Wait until the last messages of these topics have arrived; returns the time that it took, s."""
     awaited, at_once = [publishers[topic] for topic in topics], min(args.wait, TOLD_AFTER)
     waited = await_acknowledged(awaited, at_once, stop)
     if waited < at_once or stop or args.wait == at_once:
@@ -139,7 +139,7 @@ def _play(recording, publishers, args, stop) -> int:
         first = message.log_time if first is None else first
         at = (message.log_time - first) * 1e-9
         if at < args.begin:
-            # What is latched (topologies, static transforms) is in force at the beginning, whenever it was sent.
+            # Latched messages (topologies, static transforms) are in force at the beginning, whenever they were sent.
             if publishers[message.topic].qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
                 depth = publishers[message.topic].qos_profile.depth
                 latched.setdefault(message.topic, deque(maxlen=depth)).append(message)
@@ -153,7 +153,7 @@ def _play(recording, publishers, args, stop) -> int:
             _await_arrival(publishers, latched, args, stop)
         latched.clear()
         if args.step:
-            # One frame: all messages published at about the same time, as meshes of one step are.
+            # One frame: all messages published at about the same time, such as the meshes of a step.
             if last_frame is None or message.log_time - last_frame > 2_000_000:
                 if not next_wanted(f"{at:.3f} s"):
                     break

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compute a recording again, without DDS and as fast as it goes, and compare with what the node answered."""
+"""Computes a recording again, without DDS and at full speed, and compares with the node's results."""
 
 import dataclasses
 from collections import Counter, deque
@@ -25,29 +25,29 @@ from hpccd_ros.replay.frames import PATIENCE, FrameSource, FrameWindow
 from hpccd_ros.replay.input_order import InputOrder, OrderedAnswer
 from hpccd_ros.replay.recorded_setup import ReplaySetup
 
-# Frames kept for answers that come after them; at least as many as can wait in the node.
+# Frames kept for later results; at least as many as can wait in the node.
 WINDOW = 64
 
 
 @dataclasses.dataclass
 class ReplayedStep:
-    """One step of the scene: what was recorded of it and what came out now. Stamps in ns."""
+    """One step of the scene: the recorded and the computed result. Stamps in ns."""
 
     number: int  # counts the steps of this replay, from 0
-    step: int  # number that the publisher gave
+    step: int  # number from the publisher
     start: int
     end: int
     start_frame: SceneFrame | None
     end_frame: SceneFrame | None
     recorded: object | None  # ContactArray, or None in a recording without contacts
-    at: float = 0.0  # seconds into the recording, of the answer or else of the last message of its end frame
-    contacts: object | None = None  # of the core, or None where a frame is missing
+    at: float = 0.0  # seconds into the recording, of the result or else of the last message of its end frame
+    contacts: object | None = None  # of the core, or None if a frame is missing
     layout: Layout | None = None
     separation: Separation = NONE  # in force
     features: tuple[str, ...] = FEATURES  # that were tested
     bounds: MotionBounds = NO_BOUNDS  # of motion by poses
     milliseconds: float = 0.0  # the core's call, wall time
-    difference: str | None = None  # first difference from what was recorded
+    difference: str | None = None  # first difference from the recorded result
     missing: str | None = None  # why it could not be computed
     before_recording: bool = False  # it began before the recording did
     uncertain: str = ""  # why a difference would not show that the node was wrong
@@ -60,10 +60,10 @@ class ReplayedStep:
 
 @dataclasses.dataclass(eq=False)
 class _Session:
-    """What the answers since the node was configured imply for later ones. history: transforms or joint states move
-    meshes, so that frames depend on earlier messages. ``computed``: the frames of an answer existed. ``lacks_early``:
+    """What the results since the node was configured imply for later ones. history: transforms or joint states move
+    meshes, so that frames depend on earlier messages. ``computed``: the frames of a result existed. ``lacks_early``:
     inputs from before the recording are missing. ``uncertain``: later inputs are missing, in words. ``first``: stamp at
-    which the first of these answers ends. ``settled``: nothing depends on that history any more.
+    which the first of these results ends. ``settled``: nothing depends on that history any more.
     """
 
     history: bool
@@ -99,7 +99,7 @@ class _Session:
 
     @property
     def _is_first(self) -> bool:
-        """Take note of missing inputs. Only inputs of the first answer can be from before the recording."""
+        """Note missing inputs. Only inputs of the first result can be from before the recording."""
         return self.number == 0
 
     def _lack(self, known: OrderedAnswer) -> str | None:
@@ -124,18 +124,18 @@ class _Session:
         self.settled = (
             self.settled
             or not (self.history and (known.begun or self.lacks_early))
-            or (taken_inputs.STOPPED in known.listed.topics and not known.missing)  # the node forgot it, too
+            or (taken_inputs.STOPPED in known.listed.topics and not known.missing)  # the node discarded it, too
             or known.end > self.first + HISTORY_NS
         )
 
 
 class Replay:
-    """Goes once through a recording. Iterate over `steps()`; afterwards, or in between, look at the counts.
+    """Reads a recording once. Iterate over `steps()`; the counts are valid during and after the iteration.
 
-    backend, threads: as of hpccd_core.Detector; the contacts must not depend on them.
-    accuracy, features: empty: those with which each answer was found. The separation is always that of the answer.
-    outputs: computed beside the contacts (they are not compared).
-    distances: whether to check the answers of topic distances too.
+    backend, threads: as in hpccd_core.Detector; the contacts must not depend on them.
+    accuracy, features: empty: those of each result. The separation is always that of the result.
+    outputs: computed in addition to the contacts, not compared.
+    distances: whether to check the results on the topic distances too.
     begin, end: seconds into the recording; steps outside are neither computed nor counted.
     messages_read: recorded messages so far, of `message_count`.
     """
@@ -174,7 +174,7 @@ class Replay:
         self.distances = DistanceCheck(distance_topic, StepDetector(builder, self._options(None)), accuracy)
         self._mesh_names = setup.mesh_names
         self._window = FrameWindow(max(WINDOW, 2 * setup.settings["frame_queue"]))
-        self.any_one = setup.settings["report"] == "any"  # "verified" means less then: compare.py
+        self.any_one = setup.settings["report"] == "any"  # then "verified" means less: compare.py
         self.not_taken: Counter[str] = Counter()  # topic -> messages that the node did not take
         self.verified = self.diverged = self.unverified = 0
         self.frames = 0
@@ -190,7 +190,7 @@ class Replay:
         return self.source.topics + ([self._setup.contacts] if self.recorded_answers else []) + self.distances.topics
 
     def steps(self) -> Iterator[ReplayedStep]:
-        """Each recorded answer, computed again; in a recording without answers, each step from frame to frame."""
+        """Each recorded result, computed again; in a recording without results, each step from frame to frame."""
         find = self._successive_frames
         if self.recorded_answers:
             find = self._ordered_answers if self._ordered else self._answers
@@ -213,7 +213,7 @@ class Replay:
         self.distances.settle(self._window)
 
     def _lists_inputs(self) -> bool:
-        """Whether the answers list the inputs taken, and the recorder kept the times in these lists."""
+        """Whether the results list the inputs taken, and the recorder stored the times in these lists."""
         first = next(self._recording.messages([self._setup.contacts]))
         try:
             listed = read_inputs(self._decode_answer(first)) is not None
@@ -235,7 +235,7 @@ class Replay:
                 waiting.append((next(answers), self._decode_answer(message), self._at))
             elif message.topic == distances:
                 step = next(of_distances)
-                # It has no contacts and is before all others: the recording began between the two messages.
+                # It has no contacts and precedes all others: the recording began between the two messages.
                 within = (begun or step is not None) and self._begin <= self._at <= self._end
                 self.distances.put_of(step, message, counts=within)
             else:
@@ -253,7 +253,7 @@ class Replay:
         waiting = []
         for message in self._messages():
             if message.topic == self._setup.contacts:
-                # An answer may have been written before the last of the messages that it answers.
+                # A result may have been written before the last of its messages.
                 waiting.append((self.frames, self._at, self._decode_answer(message)))
             else:
                 for _ in self._push(message):
@@ -277,7 +277,7 @@ class Replay:
                 last = frame
 
     def _push(self, message) -> list[SceneFrame]:
-        """The frames that a message completes, put into the window; none of an answer about distances."""
+        """Put the frames that a message completes into the window; a result about distances completes none."""
         if message.topic in self.distances.topics:
             if self._begin <= self._at <= self._end:
                 self.distances.put(message, self.frames)
@@ -328,21 +328,22 @@ class Replay:
         try:
             found = self._detector.detect(step.start_frame, end)
         except CORE_ERRORS as error:
-            step.missing = f"the core refuses it: {error}"  # as in the node, which goes on with the next one
+            step.missing = f"the core refuses it: {error}"  # as in the node, which continues with the next one
             return
         step.contacts, step.layout, step.milliseconds = found.contacts, found.layout, found.detect_ms
         step.bounds = found.bounds
         step.separation, step.features = found.options.separation, found.options.features
 
     def _options(self, recorded):
-        """As the answer was found, if there is one; an accuracy or a separation that is none diverges: compare.py."""
+        """The options of the recorded result, if there is one; an invalid accuracy or separation diverges:
+        compare.py."""
         options = self._setup.options(self._accuracy, self._backend, self._threads)
         if recorded is not None:
             if not self._accuracy and recorded.accuracy in ACCURACIES:
                 options = dataclasses.replace(options, accuracy=recorded.accuracy)
             options = dataclasses.replace(options, report=read_report(recorded) or options.report)
             separation, features = self._separation_of(recorded), read_features(recorded)
-            # In as many parts as then: the tolerance may have been another one.
+            # In the same number of parts: the tolerance may have been different.
             rigid = dataclasses.replace(options.rigid, parts=min(recorded.parts, MOST_PARTS))
             options = dataclasses.replace(options, separation=separation, features=features, rigid=rigid)
         if self._features:
