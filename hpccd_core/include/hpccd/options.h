@@ -33,11 +33,11 @@ HPCCD_API std::vector<Simd> simd_levels();
 
 /// Options of a Detector, read once by its constructor.
 struct Options {
-  Accuracy accuracy = Accuracy::exact;
-  Backend backend = Backend::automatic;
-  Report report = Report::all;
-  Simd simd = Simd::automatic;
-  int threads = 0;  ///< number of threads, at most 1024; 0: one per core that the process may use
+  Accuracy accuracy = Accuracy::exact;   ///< tier of all pairs of meshes without their own
+  Backend backend = Backend::automatic;  ///< where steps are computed
+  Report report = Report::all;           ///< which contacts are reported
+  Simd simd = Simd::automatic;           ///< instruction set; automatic: the fastest one that the machine supports
+  int threads = 0;                       ///< number of threads, at most 1024; 0: one per core that the process may use
   // Outputs of each contact besides its features and time.
   bool points = false;   ///< where the features meet
   bool normals = false;  ///< unit normals
@@ -45,12 +45,12 @@ struct Options {
   /// Pairs that come within this Euclidean distance of each other are contacts. In units of the coordinates, finite,
   /// >= 0. 0: pairs that touch.
   double minimum_separation = 0;
-  Method method = Method::standard;
-  bool restructure = true;  ///< for `published` and `naive`: whether nodes that cull badly are rebuilt
-  /// For Backend::hybrid (Kim et al. 2009, section 5.1): the number of segments of the triangle index queue, 1 to
-  /// 65,536, the pairs per segment, 1 to 2^20, and the number of GPUs, 0 for all.
+  Method method = Method::standard;  ///< broad phase on CPUs
+  bool restructure = true;           ///< for `published` and `naive`: whether nodes that cull badly are rebuilt
+  /// For Backend::hybrid (Kim et al. 2009, section 5.1): hybrid_segments is the number of segments of the triangle
+  /// index queue, 1 to 65,536; hybrid_segment_pairs the pairs per segment, 1 to 2^20.
   std::size_t hybrid_segments = 128, hybrid_segment_pairs = 2048;
-  int gpus = 0;
+  int gpus = 0;  ///< for Backend::hybrid: number of GPUs; 0: all
   /// For Backend::gpu: profile() also contains the device time of each stage. Each event costs about 1 us.
   bool gpu_stages = false;
   /// Features that detect, collision_free_step and proximity test. Intersections and distances use whole surfaces.
@@ -61,7 +61,7 @@ struct Options {
   /// Number of independent copies of the scene, 1 to most_worlds. Positions hold all vertices of the first world, then
   /// those of the second, and so on. Results are bit-identical to running each world on its own.
   std::uint32_t worlds = 1;
-  static constexpr std::uint32_t most_worlds = 65536;
+  static constexpr std::uint32_t most_worlds = 65536;  ///< upper bound of worlds
 };
 
 }  // namespace v0_1

@@ -47,52 +47,52 @@ struct Contacts {
 
 /// Pairs of features within a distance of each other in one frame, in the order of Contacts.
 struct Proximity {
-  std::vector<std::array<std::uint32_t, 2>> vf;
-  std::vector<double> vf_distance;
-  std::vector<std::array<std::uint32_t, 4>> ee;
-  std::vector<double> ee_distance;
+  std::vector<std::array<std::uint32_t, 2>> vf;               ///< vertex, face
+  std::vector<double> vf_distance;                            ///< Euclidean distance
+  std::vector<std::array<std::uint32_t, 4>> ee;               ///< the vertices of both edges
+  std::vector<double> ee_distance;                            ///< Euclidean distance
   std::vector<std::array<std::array<double, 3>, 2>> closest;  ///< vf rows first; empty unless requested
-  std::uint64_t hash = 0;
-  WorldSlices slices;
+  std::uint64_t hash = 0;                                     ///< hash of features and distances, as in Contacts
+  WorldSlices slices;                                         ///< for several worlds, as in Contacts
 };
 
 /// Edges that intersect or touch faces in one frame, in lexicographic order.
 struct Intersections {
   std::vector<std::array<std::uint32_t, 3>> ef;  ///< edge vertices a0 < a1, face
-  std::uint64_t hash = 0;
-  WorldSlices slices;
+  std::uint64_t hash = 0;                        ///< hash of the pairs, as in Contacts
+  WorldSlices slices;                            ///< for several worlds, as in Contacts
 };
 
 /// The kind of the closest pair of features. none: no pair exists. edge_face: the meshes intersect.
 enum class GapKind : std::uint8_t { none, vertex_face, edge_edge, edge_face };
 /// The smallest distance of two meshes in one frame.
 struct Gap {
-  std::uint32_t mesh_a, mesh_b;
+  std::uint32_t mesh_a, mesh_b;  ///< mesh_a, mesh_b: numbers of the meshes, mesh_a <= mesh_b
   double distance = std::numeric_limits<double>::infinity();  ///< 0 for edge_face, infinite for none
-  GapKind kind = GapKind::none;
-  std::array<std::uint32_t, 4> features{};        ///< as in vf, ee or ef, then zeros
-  std::array<std::array<double, 3>, 2> points{};  ///< the nearest points of both meshes
+  GapKind kind = GapKind::none;                               ///< kind of the closest pair of features
+  std::array<std::uint32_t, 4> features{};                    ///< as in vf, ee or ef, then zeros
+  std::array<std::array<double, 3>, 2> points{};              ///< the nearest points of both meshes
 };
 
 /// Results in a GPU's memory, complete when the call returns. Rows and order are those of Contacts, Proximity and
 /// Intersections. Later calls do not write to the memory while `memory` is held; afterwards they reuse it. It may
 /// outlive the detector.
 struct DeviceResults {
-  std::shared_ptr<const void> memory;  ///< owns all arrays below
-  int device = -1;                     ///< number of the device; -1: page-locked host memory
-  std::uint64_t n_vf = 0, n_ee = 0, n_ef = 0;
-  const std::array<std::uint32_t, 2>* vf = nullptr;
-  const std::array<std::uint32_t, 4>* ee = nullptr;
-  const std::array<std::uint32_t, 3>* ef = nullptr;
-  const double* values = nullptr;  ///< times of impact, or distances: n_vf, then n_ee
-  /// n_vf + n_ee rows; null unless requested.
+  std::shared_ptr<const void> memory;                ///< owns all arrays below
+  int device = -1;                                   ///< number of the device; -1: page-locked host memory
+  std::uint64_t n_vf = 0, n_ee = 0, n_ef = 0;        ///< n_vf, n_ee, n_ef: numbers of rows
+  const std::array<std::uint32_t, 2>* vf = nullptr;  ///< vertex, face
+  const std::array<std::uint32_t, 4>* ee = nullptr;  ///< the vertices of both edges
+  const std::array<std::uint32_t, 3>* ef = nullptr;  ///< edge vertices, face
+  const double* values = nullptr;                    ///< times of impact, or distances: n_vf, then n_ee
+  /// points, normals: n_vf + n_ee rows; null unless requested.
   const std::array<double, 3>*points = nullptr, *normals = nullptr;
-  const std::array<std::array<double, 3>, 2>* closest = nullptr;
-  double first_toc = std::numeric_limits<double>::infinity();
-  std::uint64_t hash = 0;
-  /// For several worlds, otherwise null: as in WorldSlices and Contacts::first_tocs.
+  const std::array<std::array<double, 3>, 2>* closest = nullptr;  ///< n_vf + n_ee rows; null unless requested
+  double first_toc = std::numeric_limits<double>::infinity();     ///< infinite without contacts
+  std::uint64_t hash = 0;                                         ///< as in Contacts
+  /// vf_offsets, ee_offsets, ef_offsets, hashes: for several worlds, otherwise null; as in WorldSlices.
   const std::uint64_t *vf_offsets = nullptr, *ee_offsets = nullptr, *ef_offsets = nullptr, *hashes = nullptr;
-  const double* first_tocs = nullptr;
+  const double* first_tocs = nullptr;  ///< for several worlds, otherwise null; as in Contacts
 };
 
 /// Contacts without a copy: rows in the page-locked memory that a GPU has written, or else vectors.

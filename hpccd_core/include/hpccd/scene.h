@@ -27,8 +27,8 @@ enum class Accuracy : std::uint8_t { fast, balanced, conservative, exact };
 /// Pairs of features that are tested. At least one must be set; to test nothing between two meshes, use
 /// Scene::ignore_pair().
 struct TestedFeatures {
-  bool vertex_face = true;
-  bool edge_edge = true;
+  bool vertex_face = true;  ///< vertices against faces
+  bool edge_edge = true;    ///< edges against edges
   bool operator==(const TestedFeatures&) const = default;
 };
 
@@ -79,10 +79,11 @@ class HPCCD_API Scene {
 
   /// A mesh, and the place of its vertices, faces and edges in the scene-wide arrays.
   struct Mesh {
-    std::string name;
-    MeshOptions options;
+    std::string name;     ///< as given to add_mesh
+    MeshOptions options;  ///< as given to add_mesh
+    /// first_vertex, n_vertices, first_face, n_faces: its vertices and faces in the scene-wide numbering.
     std::uint32_t first_vertex, n_vertices, first_face, n_faces;
-    std::uint32_t first_edge, n_edges;  ///< in edges()
+    std::uint32_t first_edge, n_edges;  ///< its edges in edges()
   };
   /// All meshes, in the order added.
   const std::vector<Mesh>& meshes() const { return meshes_; }
