@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rclpy and DDS need of any program here: environment, signals, QoS, names, messages. Nothing of our node."""
+"""Environment, signals, QoS, names and messages for every program that uses rclpy and DDS. Independent of the node."""

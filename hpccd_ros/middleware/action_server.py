@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""rclpy's action server, bounded, and with an end at which all who wait are answered.
+"""rclpy's action server with limits, and with a shutdown that answers all waiting clients.
 
-rclpy 7.1 holds the request and the result of each goal as long as results are kept, 15 minutes unless told otherwise,
-in a time that stands still where simulated time does. What is overridden and read here are its own methods and fields.
+rclpy 7.1 stores the request and the result of each goal as long as results are kept, by default 15 minutes, of a clock
+that may be simulated and stand still. This module overrides and reads rclpy's private methods and fields.
 """
 
 import math
@@ -18,17 +18,17 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.task import Task
 
-# s that a goal and its result are kept after its end. Clients ask for the result as soon as the goal is accepted, most
-# of them therefore before there is one.
+# Seconds that a goal and its result are kept after its end. Clients request the result as soon as the goal is accepted,
+# so most requests come before the result.
 KEPT = 10
 
 
 class BoundedActionServer(ActionServer):
-    """goals: so many are known at a time, ended ones included; more are rejected. room: results that `keep` was given
-    are kept whole as long as their sizes sum up to no more, but for the last one, which always is.
+    """goals: most goals known at a time, including ended ones; more are rejected. room: results passed to `keep` are
+    kept while the sum of their sizes is at most this; the last one is always kept.
 
-    requests: QoS of all three services. rejected: told of each goal that is. forgotten: takes a result and empties it.
-    execute: coroutine function, is given the goal's handle; it brings the goal to its end and returns the result.
+    requests: QoS of all three services. rejected: called for each rejected goal. forgotten: called with a result to
+    empty it. execute: coroutine function of the goal's handle; it ends the goal and returns the result.
     """
 
     def __init__(
@@ -63,19 +63,19 @@ class BoundedActionServer(ActionServer):
         self._whole: dict[bytes, tuple[Any, int]] = {}  # result and size, the oldest first
         self._room = room
         self._closing = False
-        self._unasked: set[bytes] = set()  # goals whose result nobody has asked for yet
+        self._unasked: set[bytes] = set()  # goals whose result was not requested yet
         self.last_sent = -math.inf  # time.monotonic() of the last result
 
     def keep(self, goal: ServerGoalHandle, result: Any, size: int) -> None:
-        """The result of a goal that ends now, until others need its room."""
+        """Keep the result of a goal that ends now, until others need its room."""
         self._whole[bytes(goal.goal_id.uuid)] = result, size
         while len(self._whole) > 1 and sum(size for _, size in self._whole.values()) > self._room:
             oldest, _ = self._whole.pop(next(iter(self._whole)))
             self._forgotten(oldest)
 
     def finish(self, executor: Executor, patience: float) -> None:
-        """Run those that await, as their goals are ended, and send the results, those too that are asked for within
-        ``patience`` seconds; goals that come meanwhile are rejected. In the executor's thread.
+        """Run the waiting tasks of goals that were ended, and send results, including those requested within
+        ``patience`` seconds; new goals are rejected. In the executor's thread.
         """
         self._closing = True
         _run_tasks(executor)
@@ -90,7 +90,7 @@ class BoundedActionServer(ActionServer):
                     time.sleep(0.001)
 
     def _serve(self) -> bool:
-        """Whether one request at least was waiting."""
+        """Whether at least one request was waiting."""
         found = False
         implementation = self.action_type.Impl
         for take, kind, work in (
@@ -131,7 +131,7 @@ class BoundedActionServer(ActionServer):
 
 
 class _InSystemTime:
-    """A node as the action server sees it: its clock is that of the system, which goes on."""
+    """A node for the action server, with the system clock, which never stands still."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -145,7 +145,8 @@ class _InSystemTime:
 
 
 def _run_tasks(executor: Executor) -> None:
-    """Those of no entity, as rclpy's tasks of goals are, and those that they bring forth, such as sending a result."""
+    """Run tasks without an entity, such as rclpy's tasks of goals, and tasks that they create, such as sending a
+    result."""
     seen: set[Task] = set()
     while new := [task for task, entity, _ in tuple(executor._tasks) if entity is None and task not in seen]:
         for task in new:
@@ -154,7 +155,7 @@ def _run_tasks(executor: Executor) -> None:
 
 
 def _run(work: Coroutine[Any, Any, None]) -> None:
-    """To its end: nothing in it awaits for long."""
+    """Run it to its end: it does not wait for long."""
     try:
         while True:
             work.send(None)

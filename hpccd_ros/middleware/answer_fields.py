@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How an answer was computed <-> the fields of ContactArray: separation, features, bounds of motions, inputs."""
+"""Converts how a result was computed to fields of ContactArray, and back: separation, features, deviation bounds,
+inputs."""
 
 from array import array
 from collections.abc import Iterator, Sequence
@@ -23,7 +24,7 @@ def fill_separation(message: ContactArray, separation: Separation) -> None:
 
 
 def read_separation(message: ContactArray) -> Separation:
-    """Raises ValueError where the fields do not fit together, or tell what no scene can have."""
+    """Raises ValueError if the fields are inconsistent or invalid."""
     mesh_a, mesh_b, distances = message.separation_mesh_a, message.separation_mesh_b, message.separations
     if not len(mesh_a) == len(mesh_b) == len(distances):
         raise ValueError(
@@ -40,7 +41,7 @@ def read_separation(message: ContactArray) -> Separation:
     return separation
 
 
-# By the kind of contact that they make.
+# By the kind of contact.
 _BITS = {"vertex_face": 1 << ContactArray.VERTEX_FACE, "edge_edge": 1 << ContactArray.EDGE_EDGE}
 
 
@@ -50,7 +51,7 @@ def fill_features(message: ContactArray, features: tuple[str, ...]) -> None:
 
 
 def read_features(message: ContactArray) -> tuple[str, ...]:
-    """In the order of FEATURES; both where the message does not tell."""
+    """In the order of FEATURES; both if the message has no such field."""
     tested = tuple(name for name in FEATURES if message.tested_features & _BITS[name])
     return tested if 0 < message.tested_features <= sum(_BITS.values()) else FEATURES
 
@@ -62,7 +63,7 @@ def fill_bounds(message: ContactArray, bounds: MotionBounds) -> None:
 
 
 def read_bounds(message: ContactArray) -> MotionBounds:
-    """Raises ValueError where the fields do not fit together."""
+    """Raises ValueError if the fields are inconsistent."""
     bounds, meshes = np.frombuffer(message.motion_bounds, np.float64), len(message.mesh_names)
     if len(bounds) != (meshes if message.parts else 0):
         raise ValueError(f"motion_bounds has {len(bounds)} entries for {meshes} meshes and {message.parts} parts")
@@ -73,7 +74,7 @@ def read_bounds(message: ContactArray) -> MotionBounds:
 
 @dataclass(frozen=True, eq=False)
 class ListedInputs:
-    """Iterate over the inputs that an answer lists: they are numbered without gaps, after ``before`` others.
+    """Iterate over the inputs that a result lists: they are numbered without gaps, after ``before`` others.
 
     ``start``, ``end``: inputs taken when the frame at the start of the step, and that at its end, was complete.
     """
@@ -107,7 +108,7 @@ def fill_inputs(message: ContactArray, taken: Sequence[TakenInput], start: int, 
 
 
 def read_inputs(message: ContactArray) -> ListedInputs | None:
-    """The inputs that an answer lists; None: its node lists none. Raises ValueError if fields conflict."""
+    """The inputs that a result lists; None: its node lists none. Raises ValueError if fields conflict."""
     before, topics, sent = message.inputs_before, message.input_topics, message.input_sent
     if not (before or message.start_inputs or len(message.input_topic) or len(sent) or len(message.input_flags)):
         return None
@@ -129,5 +130,5 @@ def fill_report(message: ContactArray, report: str) -> None:
 
 
 def read_report(message: ContactArray) -> str | None:
-    """The option ``report`` of the answer; None: unknown."""
+    """The option ``report`` of the result; None: unknown."""
     return REPORTS[message.report - 1] if 0 < message.report <= len(REPORTS) else None

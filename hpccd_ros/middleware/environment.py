@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Set this process up for DDS messages of several megabytes; call `prepare()` before `rclpy.init()`.
+"""Configures this process for DDS messages of several megabytes; call `prepare()` before `rclpy.init()`.
 
-Every step gives way to what the user has set, and does nothing where it does not apply.
+Settings of the user have priority, and steps that do not apply do nothing.
 """
 
 import ctypes
@@ -15,8 +15,8 @@ from hpccd_ros.base.errors import UserError
 
 # glibc's mallopt parameters (malloc.h), the environment variable of each, and our value.
 # Keeping freed megabytes instead of returning them to the kernel saves the page faults of the next message:
-# measured 17 -> 6 ms one way for 5 MB between two rclpy processes. Kept in an arena for each thread, it would add
-# up: publishers that came and went 290 times in half an hour took 3 MB.
+# measured 17 -> 6 ms one way for 5 MB between two rclpy processes. With an arena for each thread it would add up:
+# 290 publishers one after the other took 3 MB.
 _MALLOC = (
     ("MALLOC_ARENA_MAX", -8, 2),
     ("MALLOC_MMAP_THRESHOLD_", -3, 1 << 30),
@@ -24,15 +24,15 @@ _MALLOC = (
     ("MALLOC_TOP_PAD_", -2, 64 << 20),
 )
 
-# Any of these says that the user has chosen a transport or a profile: ours would override it.
+# With any of these the user has chosen a transport or a profile, which ours would override.
 _DDS_CHOICES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE", "FASTDDS_BUILTIN_TRANSPORTS")
-# Makes ROS leave to the profile how queues keep their memory, and with it how messages are sent: what a user says of
-# either wins.
+# Makes ROS leave the memory policy of queues to the profile, and with it how messages are sent: the user's setting of
+# either has priority.
 _QUEUES_OF_PROFILE = "RMW_FASTRTPS_USE_QOS_FROM_XML"
 _SENDING = "RMW_FASTRTPS_PUBLICATION_MODE"
 _DDS_FILES = ("DEFAULT_FASTRTPS_PROFILES.xml", "DEFAULT_FASTDDS_PROFILES.xml")
 
-# In the package's folder config. Users may call a profile of theirs alike: only the folder tells them apart.
+# In the package's folder config. A user's profile may have the same name: only the folder distinguishes them.
 _PROFILES = ("fastdds_localhost.xml", "fastdds.xml")
 _FOLDER = ("share", "hpccd", "config")  # of any installation
 
@@ -41,12 +41,12 @@ _OFTEN = (
     f'<times xmlns="{_NAMESPACE}"><heartbeatPeriod><sec>0</sec><nanosec>100000000</nanosec></heartbeatPeriod></times>'
 )
 
-# The switch that opens discovery to the network (SUBNET), and others that say whom the user wants to meet.
+# The variable that opens discovery to the network (SUBNET), and others that select peers.
 DISCOVERY = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _BEYOND_THIS_HOST = ("SUBNET", "SYSTEM_DEFAULT", "", None)
 _DISCOVERY_CHOICES = (DISCOVERY, "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY")
 
-# The RMW implementation that the user asks for.
+# The RMW implementation that the user requests.
 RMW = "RMW_IMPLEMENTATION"
 
 
@@ -70,14 +70,14 @@ def shorten_heartbeats(folder: Path) -> None:
     tree = ElementTree.parse(profile)
     for writer in tree.iter(f"{{{_NAMESPACE}}}data_writer"):
         writer.insert(0, ElementTree.fromstring(_OFTEN))
-    own = folder.joinpath(*_FOLDER, profile.name)  # so that `prepare` replaces it, as it does all of ours
+    own = folder.joinpath(*_FOLDER, profile.name)  # so that `prepare` replaces it, like all of ours
     own.parent.mkdir(parents=True)
     tree.write(own, encoding="utf-8", xml_declaration=True)
     os.environ[_DDS_CHOICES[0]] = str(own)
 
 
 def give_back_freed_memory() -> None:
-    """Return to the kernel what is free now, for a process that has kept it since `prepare` for long enough.
+    """Return free memory, which is kept since `prepare`, to the kernel.
 
     glibc keeps the end of each arena but the first: as much as the largest message that a thread of DDS received.
     """
@@ -87,9 +87,9 @@ def give_back_freed_memory() -> None:
 
 
 def this_host_only() -> bool:
-    """Whether discovery is limited to this machine, as the environment stands after ``prepare``."""
-    localhost_only = os.environ.get("ROS_LOCALHOST_ONLY")  # older, and stronger where both are set
-    # Of a value that it does not know, ROS says that it assumes localhost.
+    """Whether the environment limits discovery to this machine, after ``prepare``."""
+    localhost_only = os.environ.get("ROS_LOCALHOST_ONLY")  # older, with priority if both are set
+    # ROS takes an unknown value as localhost.
     return localhost_only == "1" if localhost_only else os.environ.get(DISCOVERY) not in _BEYOND_THIS_HOST
 
 
@@ -101,8 +101,8 @@ def find_shares_of_wheels() -> None:
 
 
 def check_rmw() -> None:
-    """Call before rclpy is imported, which ends the process, status 102, if the RMW implementation that the user asks
-    for is not installed. Raises UserError instead."""
+    """Raises UserError if the requested RMW implementation is not installed. Call it before importing rclpy, which
+    would end the process with status 102."""
     asked = os.environ.get(RMW)
     if not asked:
         return
@@ -110,10 +110,10 @@ def check_rmw() -> None:
 
     find_shares_of_wheels()
     if not os.environ.get("AMENT_PREFIX_PATH"):
-        return  # nobody says what is installed
+        return  # it is unknown what is installed
     try:
         get_package_prefix(asked)
-    except (PackageNotFoundError, ValueError) as error:  # ValueError: no name of a package
+    except (PackageNotFoundError, ValueError) as error:  # ValueError: no package name
         raise UserError(
             f"{RMW}: {quoting.quoted(asked)} is not installed here; unset it, or set it to rmw_fastrtps_cpp"
         ) from error
@@ -122,17 +122,17 @@ def check_rmw() -> None:
 def _choose_dds_profile() -> None:
     from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 
-    # One of ours was inherited from a parent process, whose discovery range may have been another.
+    # One of ours was inherited from a parent process, whose discovery range may differ.
     chosen = [os.environ[name] for name in _DDS_CHOICES if os.environ.get(name)]
     if not all(_ours(Path(value)) for value in chosen) or any(Path(name).is_file() for name in _DDS_FILES):
         return
-    # Nobody on the network is met unless asked for: without DDS security whoever is met may send anything.
+    # No peers on the network by default: without DDS security any peer may send anything.
     if not any(os.environ.get(name) for name in _DISCOVERY_CHOICES):
         os.environ[DISCOVERY] = "LOCALHOST"
     try:
         share = get_package_share_directory("hpccd")
     except PackageNotFoundError:
-        return  # run from the sources without installation: Fast DDS works with its defaults, only slower
+        return  # not installed: Fast DDS works with its defaults, but slower
     profile = _PROFILES[0 if this_host_only() else 1]
     os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(Path(share) / "config" / profile)
     if not os.environ.get(_SENDING):

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""rclpy's executor, with what it lacks.
+"""Extensions of rclpy's executor.
 
-GuardedExecutor: what a callback raises ends the callback, never the node: logged, counted, reported on /diagnostics.
+GuardedExecutor: an exception in a callback ends the callback, not the node. It is logged, counted and reported on
+/diagnostics.
 
-LeanExecutor: fewer and shorter turns; what rclpy does in Python around each message is part of the latency. A node with
-a robot has 35 handlers of events of QoS, most of them for warnings, and for each turn rclpy builds its wait set anew:
-with them a turn takes twice as long. And each callback ends with a wake-up, which costs an empty turn.
+LeanExecutor: fewer and shorter turns, because rclpy's Python code around each message is part of the latency. A node
+with a robot has 35 QoS event handlers, most of them for warnings, and rclpy rebuilds its wait set in each turn: with
+them a turn takes twice as long. Each callback also ends with a wake-up, which costs an empty turn.
 
 UnreadableExecutor: notices messages that cannot be deserialised, which the middleware drops silently. A subscription is
-ready only where a message waits; if none can be taken then, those that waited were unreadable. Seen with Fast DDS 2.14:
-never otherwise, neither for publishers that end or are killed nor for a history that overflows. How many they were only
-the gap in the publisher's numbers tells, and unreadable ones in front of a readable one only that gap.
+ready only if a message is waiting; if none can be taken then, the waiting ones were unreadable. With Fast DDS 2.14 this
+never happened otherwise, neither for publishers that end or are killed nor for a history that overflows. Their number
+is only known from the gap in the publisher's sequence numbers, and so are unreadable ones before a readable one.
 """
 
 import threading
@@ -29,18 +30,18 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.task import Task
 
-# Waits of the executor that may fail one after the other, without a callback in between, before the node gives up:
-# one that can neither hear nor be told to end is better started again.
+# Waits of the executor that may fail in a row, without a callback in between, before the node ends: a node that
+# receives nothing and cannot be stopped should be restarted.
 MOST_IN_A_ROW = 100
-# Of the text of an error, which may quote what others sent.
+# Characters of an error's text, which may quote received data.
 LONGEST = 500
 
 
 class Errors:
-    """Exceptions that nothing expected; from any thread.
+    """Unexpected exceptions. Thread-safe.
 
-    log: takes the whole traceback, once for each kind of exception and place where it was raised: a publisher in
-    error repeats it at its full rate.
+    log: called with the traceback, once for each kind of exception and place where it was raised, because a faulty
+    publisher repeats it at its full rate.
     """
 
     def __init__(self, log: Callable[[str], None]) -> None:
@@ -51,7 +52,7 @@ class Errors:
         self.last = ""
 
     def caught(self, where: str, error: Exception) -> str:
-        """Count it; returns a line that names it. where: what did not get done, for the reader of the log."""
+        """Count it; returns a line that names it. where: what was not done, for the log."""
         places = traceback.extract_tb(error.__traceback__)
         kind = (type(error), places[-1].filename, places[-1].lineno) if places else (type(error), where, 0)
         text = f"{where}: {type(error).__name__}: {error}"[:LONGEST]
@@ -67,10 +68,10 @@ class Errors:
 
 
 class GuardedExecutor(SingleThreadedExecutor):
-    """Goes on after a callback that raised; `errors` has it. A service's caller is told that it failed.
+    """Continues after an exception in a callback, which is in `errors`. The caller of a service receives a failure.
 
-    rclpy's own raises it from spin_once; and where taking the message raised, neither that subscription nor another
-    of its callback group is served ever again.
+    rclpy's executor raises it from spin_once; and if taking the message raised, neither that subscription nor others of
+    its callback group are served again.
     """
 
     def __init__(self, errors: Errors, *, context: Context | None = None) -> None:
@@ -92,7 +93,7 @@ class GuardedExecutor(SingleThreadedExecutor):
             self._caught("executor", error)
 
     def _make_handler(self, entity: Any, node: Any, take: Callable[[Any], Any]) -> Any:
-        # All that rclpy runs for an entity passes here. take: gives the coroutine function to be run, or None.
+        # rclpy calls this for each entity. take: returns the coroutine function to run, or None.
         def guarded(entity: Any) -> Any:
             try:
                 work = take(entity)
@@ -126,7 +127,7 @@ class GuardedExecutor(SingleThreadedExecutor):
         return answer
 
     def _caught(self, where: str, error: Exception) -> str:
-        if not self.context.ok():  # rclpy's calls fail then, whatever they are
+        if not self.context.ok():  # then all calls of rclpy fail
             raise ExternalShutdownException() from error
         return self._errors.caught(where, error)
 
@@ -140,7 +141,7 @@ def _name(entity: Any) -> str:
 
 
 def _failed(response: Any, request: Any, text: str) -> Any:
-    """`response`, fresh and so without success where it has such a field, with the reason where it has a place."""
+    """A new `response`, thus without success if it has that field, with the reason if it has a field for it."""
     if hasattr(response, "message"):
         response.message = text
     if hasattr(response, "results"):  # set_parameters: one for each
@@ -150,7 +151,7 @@ def _failed(response: Any, request: Any, text: str) -> Any:
     return response
 
 
-#: Seconds between looks at events that only warn; a wait that is under way when one comes is not ended by it.
+#: Seconds between checks of events that only warn; they do not end a wait.
 LOOK_EVERY = 0.5
 WARNINGS = frozenset(
     {
@@ -163,7 +164,7 @@ WARNINGS = frozenset(
 
 
 class LeanExecutor(SingleThreadedExecutor):
-    """For nodes with a timer of their own, as warnings may else come as late as the next message."""
+    """For nodes with a timer; otherwise warnings may be as late as the next message."""
 
     def __init__(self, *, context: Context | None = None) -> None:
         super().__init__(context=context)
@@ -198,8 +199,8 @@ class LeanExecutor(SingleThreadedExecutor):
 
 
 class _WakeOfOthers(GuardCondition):
-    """``unheard_of``: a thread that runs what the last wait has found, and looks for work before it waits again. Of
-    what tasks bring forth it would not know: it runs them and then waits."""
+    """``unheard_of``: a thread that runs the results of the last wait, and looks for work before it waits again. It
+    does not know of new tasks created by tasks: it runs those and then waits."""
 
     unheard_of: int | None = None
 
@@ -212,12 +213,12 @@ _watched: weakref.WeakKeyDictionary[Subscription, Callable[[], None]] = weakref.
 
 
 def watch_unreadable(subscription: Subscription, on_unreadable: Callable[[], None]) -> None:
-    """Call ``on_unreadable`` at each sign of them, where an UnreadableExecutor runs the node."""
+    """Call ``on_unreadable`` at each sign of unreadable messages, if an UnreadableExecutor runs the node."""
     _watched[subscription] = on_unreadable
 
 
 class UnreadableExecutor(SingleThreadedExecutor):
-    """Tells those that `watch_unreadable`."""
+    """Calls the functions given to `watch_unreadable`."""
 
     def _take_subscription(self, subscription: Subscription) -> Any:
         work = super()._take_subscription(subscription)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stamps and array fields of messages, without copies where the bytes allow it.
+"""Stamps and array fields of messages, without copies if possible.
 
 Array fields are never assigned from numpy: rclpy's setter would walk it element by element (123 ms for 5 MB
 of float32), while ``array.array`` filled from the buffer takes 0.5 ms. A message made with check_fields=True
-takes such an array as it is; any other copies it once more.
+takes such an array as it is; others copy it once more.
 """
 
 from array import array
@@ -18,7 +18,7 @@ _CODES = {np.dtype(np.float32): "f", np.dtype(np.float64): "d", np.dtype(np.uint
 
 
 class InvalidMessageError(ValueError):
-    """A message that cannot be used: ``reason`` for the counters, the text says what to mend."""
+    """An invalid message: ``reason`` for the counters; the text has the problem and the remedy."""
 
     def __init__(self, reason: Reason, text: str) -> None:
         super().__init__(text)
@@ -27,7 +27,7 @@ class InvalidMessageError(ValueError):
     def refusal(
         self, mesh: str, what: Input = Input.VERTICES, aspect: Aspect = Aspect.PLACE, sent: int | None = None
     ) -> Refusal:
-        """Of the message, as one of ``mesh``."""
+        """The refusal of the message, as one of ``mesh``."""
         return Refusal(mesh, self.reason, str(self), what=what, aspect=aspect, sent=sent)
 
 
@@ -59,5 +59,5 @@ def to_field(values: np.ndarray) -> array:
 
 
 def zeros(code: str, count: int) -> array:
-    """A field to be written into through np.frombuffer: to_field would copy a temporary."""
+    """A field to write into through np.frombuffer: to_field would copy a temporary."""
     return array(code, [0]) * count

@@ -14,9 +14,9 @@ from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.joint_frames import JointFrames
 from hpccd_ros.robots.joint_history import check_lengths
 
-# Bound what is kept of a message that anybody may send.
+# Limits for stored messages, which anyone may send.
 MOST_JOINTS = 1000
-MOST_CHARACTERS = 100_000  # of their names
+MOST_CHARACTERS = 100_000  # total length of their names
 # Last messages of a topic, kept for robots whose description has not arrived.
 MOST_RECENT = 100
 
@@ -33,7 +33,7 @@ def kept(message: JointState) -> JointState | None:
 
 
 def too_large(topic: str) -> Refusal:
-    """Of a message that is not kept for a robot whose description has not come."""
+    """For a message that is not kept for a robot whose description has not arrived."""
     text = (
         f"a joint state with more than {MOST_JOINTS} names, or {MOST_CHARACTERS} characters of names, is not kept "
         "until the description of its robot comes; publish fewer joints in one message"
@@ -45,8 +45,8 @@ def fill(
     robots: Iterable[JointFrames], message: Any, topic: str, sent: int = UNKNOWN_TIME, publisher: int | None = None
 ) -> list[Refusal]:
     """Give a sensor_msgs/JointState of ``topic``, sent at ``sent``, to the robots that it moves. Returns a refusal for
-    each robot that cannot use all of it, and if no robot can use it; other robots use it nevertheless. An earlier
-    message is refused if this one shows that it was far ahead. publisher: number of the publisher if there are several.
+    each robot that cannot use all of it, and if no robot can use it; other robots still use it. An earlier message is
+    rejected if this one shows that it was far ahead. publisher: number of the publisher if there are several.
     If publishers contradict each other, a refusal reports it, though the message is used."""
     problems: list[str] = []
     contradiction = ""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who listens to a publisher. DDS tells its two ends of each other one after the other.
+"""Waiting for the subscribers of a publisher. DDS matches both ends one after the other.
 
 A publisher may know its reader seconds before the reader knows it (up to a third of healthy_check_timeout_ms of
-config/fastdds*.xml). What is published meanwhile comes late, and lost is what the publisher's history no longer
-holds then. So a stream begins in two steps: `await_subscribers`, then one message and `await_acknowledged`.
+config/fastdds*.xml). Messages published meanwhile arrive late, and those that the publisher's history no longer has
+are lost. So a stream begins in two steps: `await_subscribers`, then one message and `await_acknowledged`.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from rclpy.publisher import Publisher
 def await_subscribers(
     publishers: Mapping[str, Publisher], wanted: int, wait: float, stop: Sequence = ()
 ) -> dict[str, int]:
-    """Wait until each publisher has `wanted` subscribers, `wait` s at most or until `stop` is filled.
+    """Wait until each publisher has `wanted` subscribers, at most `wait` s or until `stop` is not empty.
 
-    Returns those that still have fewer, with how many they have.
+    Returns the publishers with fewer, and their numbers of subscribers.
     """
     deadline = time.monotonic() + wait
     while True:
@@ -32,13 +32,13 @@ def await_subscribers(
 
 
 def await_acknowledged(publishers: Iterable[Publisher], wait: float, stop: Sequence = ()) -> float:
-    """Wait until every reliable reader has what was published, `wait` s at most or until `stop` is filled.
+    """Wait until every reliable reader has all messages, at most `wait` s or until `stop` is not empty.
 
-    Returns how long it took, s.
+    Returns the time that it took, s.
     """
     begin = time.monotonic()
     for publisher in publishers:
-        # In short pieces: signals are answered between them.
+        # In short intervals, because signals are handled between them.
         while not publisher.wait_for_all_acked(Duration(seconds=0.1)):
             if stop or time.monotonic() - begin >= wait:
                 break

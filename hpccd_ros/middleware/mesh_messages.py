@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Topologies and vertices of a mesh: messages <-> numpy arrays, checked."""
+"""Converts messages with topologies and vertices of a mesh to checked numpy arrays, and back."""
 
 import array
 from collections.abc import Mapping
@@ -23,9 +23,9 @@ def topology_from_message(message: MeshTopology, limits: Mapping[str, int]) -> T
     """Checked topology; ``faces`` (F,3) and ``edges`` (E,2) uint32 are views of the message's bytes.
 
     limits: max_vertices, max_faces, max_edges.
-    Raises InvalidMessageError: too large, no triples or pairs, an index out of range, a stamp that is no time.
+    Raises InvalidMessageError: too large, no triples or pairs, an index out of range, an invalid stamp.
     """
-    stamp_to_ns(message.header.stamp)  # not used, but wrong
+    stamp_to_ns(message.header.stamp)  # not used, but invalid
     faces = _features("faces", message.faces, 3, limits)
     edges = _features("edges", message.edges, 2, limits)
     check_size("n_vertices", message.n_vertices, "max_vertices", limits["max_vertices"])
@@ -65,7 +65,7 @@ def vertices_from_message(message: MeshVertices, max_vertices: int) -> np.ndarra
 def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
     """(n,3) float32 or float64 from the fields x, y, z of a PointCloud2, n = width * height.
 
-    A view where x, y, z fill the points without a gap, else a copy. Fields may come in any order, with
+    A view if x, y, z fill the points without gaps, else a copy. Fields may come in any order, with
     padding within points and rows; x, y, z of both types become float64 (exactly).
     Raises InvalidMessageError: big-endian, fields missing or of another type or out of bounds, too little
     data, too large, NaN, infinity or beyond 1e150.
@@ -78,7 +78,7 @@ def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
     count = cloud.width * cloud.height
     check_size("width * height", count, "max_vertices", max_vertices)
     row_bytes = cloud.width * cloud.point_step
-    # A cloud of one row may leave row_step at 0: there is no second row to step to.
+    # A cloud with one row may leave row_step at 0, because there is no second row.
     row_step = cloud.row_step if cloud.height > 1 else max(cloud.row_step, row_bytes)
     if row_step < row_bytes:
         raise InvalidMessageError(
@@ -110,7 +110,7 @@ def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
 
 
 def pose_from_message(message: PoseStamped) -> Rigid:
-    """Raises InvalidMessageError: not finite, or a quaternion that is not of length 1."""
+    """Raises InvalidMessageError: not finite, or a quaternion whose length is not 1."""
     place, turn = message.pose.position, message.pose.orientation
     try:
         return Rigid.of((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))
@@ -148,7 +148,7 @@ def check_size(what: str, size: int, parameter: str, limit: int) -> None:
 
 
 def usable(vertices: np.ndarray) -> np.ndarray:
-    """``vertices`` themselves. Raises InvalidMessageError: NaN, infinity or beyond 1e150."""
+    """Returns ``vertices``. Raises InvalidMessageError: NaN, infinity or beyond 1e150."""
     if problem := unusable_coordinates(vertices):
         raise InvalidMessageError(*problem)
     return vertices

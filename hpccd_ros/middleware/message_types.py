@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names of message types, and the Python classes behind them."""
+"""Names of message types, and their Python classes."""
 
 import importlib
 import re
@@ -16,19 +16,20 @@ CONTACTS = "hpccd/msg/ContactArray"
 DISTANCES = "hpccd/msg/DistanceArray"
 PAIRS = "hpccd/msg/PairSummaryArray"
 
-# A name may come from a recording: it must not lead out of the folders of messages, nor to any other module.
+# A name may come from a recording: it must not leave the folders of messages, nor import another module.
 _TYPE_NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/([a-z]+)/([A-Za-z][A-Za-z0-9_]*)")
 
 
 def split_type_name(type_name: str) -> tuple[str, str, str]:
-    """("pkg", "msg", "Name") of "pkg/msg/Name". Raises LookupError where it is no such name."""
+    """("pkg", "msg", "Name") of "pkg/msg/Name". Raises LookupError if the name has another form."""
     if (match := _TYPE_NAME.fullmatch(type_name)) is None:
         raise LookupError(f"{type_name!r} is no name of a message type (package/msg/Name)")
     return match[1], match[2], match[3]
 
 
 def message_class(type_name: str):
-    """The Python class of "pkg/msg/Name". Raises LookupError where it is no such name, or is not installed."""
+    """The Python class of "pkg/msg/Name". Raises LookupError if the name has another form, or the type is not
+    installed."""
     package, folder, short = split_type_name(type_name)
     try:
         found = getattr(importlib.import_module(f"{package}.{folder}"), short)

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The quality of service of every topic, in one place."""
+"""The QoS of every topic."""
 
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
 
 def keep_last(depth: int, *, reliable: bool = True, latched: bool = False) -> QoSProfile:
-    """reliable: else best effort. latched: transient local, so that who comes late gets the last `depth` too."""
+    """reliable: else best effort. latched: transient local, so that late subscribers receive the last `depth`
+    messages."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=depth,
@@ -17,45 +18,45 @@ def keep_last(depth: int, *, reliable: bool = True, latched: bool = False) -> Qo
 
 # The last topology reaches a node that starts after it was published.
 TOPOLOGY = keep_last(1, latched=True)
-# The reader keeps several: of two that come at once, the later (a conflicting one, that of the next break) would else
-# replace the earlier before the node has seen it. Ten bound what a stranger can make the node hold.
+# The reader keeps several: otherwise the later of two that arrive at once (a conflicting one, that of the next break)
+# would replace the earlier before the node has read it. Ten limit the memory that untrusted publishers can use.
 TOPOLOGY_INPUT = keep_last(10, latched=True)
 
-# Enough for a reader that is late now and then (a depth of 2 lost 3 % at 200 Hz); recorders ask for more.
+# Enough for a reader that is sometimes late (a depth of 2 lost 3 % at 200 Hz); recorders request more.
 CONTACTS = keep_last(10)
 DISTANCES = CONTACTS
 PAIRS = CONTACTS
-# The reader's end, where parameter contacts_durability has them latched.
+# The reader's QoS if the parameter contacts_durability is transient_local.
 LATCHED_CONTACTS = keep_last(10, latched=True)
 
-# The requests that a service got and its answers, where parameter service_introspection publishes them.
+# Requests and responses of a service, if the parameter service_introspection publishes them.
 SERVICE_EVENTS = keep_last(10)
 
 DIAGNOSTICS = keep_last(10)
 
-# As tf2's own listeners ask for them.
+# As tf2's listeners request them.
 TRANSFORMS = keep_last(100)
 TRANSFORMS_STATIC = keep_last(100, latched=True)
 
-# As robot_state_publisher offers it.
+# As offered by robot_state_publisher.
 DESCRIPTION = keep_last(1, latched=True)
 
-# A viewer wants the newest only.
+# Viewers need only the newest.
 MARKERS = keep_last(1)
 
 
 def contacts(durability: str) -> QoSProfile:
     """Publisher of contacts. durability: "volatile" or "transient_local"."""
-    # Not 1 where they are latched: a reader that is late now and then would lose what the publisher holds no longer.
+    # Not 1 if latched: a reader that is sometimes late would lose messages that the publisher no longer has.
     return keep_last(CONTACTS.depth, latched=durability == "transient_local")
 
 
 def stop(timeout: float, depth: int = 1) -> QoSProfile:
-    """Of the topic stop: the reader hears of it where nothing came for `timeout` s. Writer and reader may differ: a
-    reader that asks for a shorter one than the writer offers is not served at all.
+    """The topic stop: the reader is notified if no message arrived for `timeout` s. Writer and reader may differ, but a
+    reader that requests a shorter time than the writer offers receives nothing.
 
-    Liveliness by topic: it says that the thread which publishes goes on. An automatic one would be kept up by threads
-    of the middleware while that thread is stuck.
+    Liveliness is manual by topic: it shows that the publishing thread continues. Automatic liveliness would be kept up
+    by threads of the middleware while that thread hangs.
     """
     profile = keep_last(depth, latched=True)
     profile.deadline = Duration(seconds=timeout)
@@ -75,5 +76,5 @@ def joint_states(reliability: str) -> QoSProfile:
 
 
 def requests(depth: int) -> QoSProfile:
-    """A service in whose queue so many requests find room; the usual profile of services holds 10."""
+    """A service whose queue holds this many requests; the default profile of services holds 10."""
     return keep_last(depth)

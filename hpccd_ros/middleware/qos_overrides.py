@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters qos_overrides.TOPIC.publisher|subscription.POLICY: the quality of service of a topic as the user wants it.
+"""Parameters qos_overrides.TOPIC.publisher|subscription.POLICY: the user's QoS of a topic.
 
-TOPIC is the whole name, namespace and remapping applied. Only what is given is declared: the rest keeps its default,
+TOPIC is the full name, with namespace and remapping. Only given policies are declared: others keep their default;
 that of vertices follows input_reliability and input_depth, which may change while the node is unconfigured.
 """
 
@@ -20,7 +20,7 @@ from hpccd_ros.base.quoting import not_one_of, shortened
 from hpccd_ros.middleware import topic_names
 
 PREFIX = "qos_overrides."
-# A history of more would hold more messages than a node has memory for.
+# A larger history would hold more messages than fit into memory.
 DEEPEST = 100_000
 _CHOICES = {"history": ("keep_last", "keep_all"), "reliability": ("reliable", "best_effort")}
 _POLICIES = {"history": QoSPolicyKind.HISTORY, "depth": QoSPolicyKind.DEPTH, "reliability": QoSPolicyKind.RELIABILITY}
@@ -80,7 +80,7 @@ def _options(node: Node, entity: str, topic: str) -> QoSOverridingOptions:
 
 
 def _given(node: Node) -> dict[str, Parameter]:
-    overrides = getattr(node, "_parameter_overrides", {})  # rclpy has no public list of what was given
+    overrides = getattr(node, "_parameter_overrides", {})  # rclpy has no public list of given parameters
     return {name: parameter for name, parameter in overrides.items() if name.startswith(PREFIX)}
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a resource lies: a path as it is, or package:// and file:// as ROS's tools write them."""
+"""Paths of resources: a plain path, or a URI with package:// or file:// as in ROS."""
 
 import re
 from pathlib import Path, PurePosixPath
@@ -18,7 +18,7 @@ _PACKAGE = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 def local_path(resource: str) -> str:
     """The path of a file on this machine. package://PACKAGE/PATH: in the share folder of that package, and only there.
 
-    %20 and the like in a URI are what they stand for. Raises MeshFileError naming the resource and the remedy.
+    Percent-encoding in a URI is decoded. Raises MeshFileError naming the resource and the remedy.
     """
     if (parts := _SCHEME.fullmatch(resource)) is None:
         return resource

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A robot of its description and the files that this names, wherever they lie."""
+"""A robot from its description and the files that it names."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -21,7 +21,7 @@ _MOST_BYTES = 4 * MOST_CHARACTERS
 
 
 def text_of(resource: str) -> str:
-    """Of a file: a path, package:// or file://. Raises RobotError."""
+    """The text of a file: a path, package:// or file://. Raises RobotError."""
     try:
         with open(path_of(resource), "rb") as file:
             data = file.read(_MOST_BYTES + 1)
@@ -45,8 +45,8 @@ def path_of(resource: str) -> Path:
 
 
 def resolver(description: str | None) -> Resolver:
-    """For mesh files of a description. description: its file, from whose folder relative names start; None: it came on
-    a topic."""
+    """The resolver for mesh files of a description. description: its file, in whose folder relative names start; None:
+    it came on a topic."""
     if description is None:
         return resources.local_path
     return beside(path_of(description).absolute().parent, resources.local_path)
@@ -62,6 +62,6 @@ def robot_of(name: str, values: Mapping[str, Any], text: str, semantics: str | N
 
 
 def mesh_uris(text: str, geometry: str) -> Iterator[str]:
-    """Of all mesh files that a description names, each once, in its order. Raises RobotError."""
+    """The mesh files that a description names, each once, in its order. Raises RobotError."""
     shapes = (part.shape for link in urdf.parse(text, geometry).links for part in link.geometry)
     yield from dict.fromkeys(shape.uri for shape in shapes if isinstance(shape, MeshFile))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""rclpy.init, and what to say where ROS does not start: one sentence instead of a traceback."""
+"""rclpy.init, and one sentence instead of a traceback if ROS does not start."""
 
 import os
 import re
@@ -37,13 +37,13 @@ LAST_DOMAIN = 232
 def init(arguments: list[str] | None = None) -> None:
     """rclpy.init without signal handlers; ``arguments``: with the name of the program, default: those of the process.
 
-    Where rcl's log file cannot be written, ROS starts without one, and says so: rcl itself would not start.
+    If rcl's log file cannot be written, ROS starts without one and reports it: rcl itself would not start.
     Raises UserError for a domain that Fast DDS would end the process for, and rclpy's own errors: see `start_failure`.
     """
     domain = os.environ.get("ROS_DOMAIN_ID", "")
     if domain.isdecimal() and int(domain) > LAST_DOMAIN:
         raise UserError(f"ROS_DOMAIN_ID: {shortened(domain)} is outside 0 .. {LAST_DOMAIN}")
-    # Comes beside the error of a node that cannot be created, and says nothing of why.
+    # Follows the error of a node that cannot be created, and does not contain the reason.
     warnings.filterwarnings("ignore", "Failed to fini rosout publisher", RuntimeWarning)
     arguments = list(sys.argv if arguments is None else arguments)
     if _NO_LOG_FILE not in arguments and (why := _no_log_file()):
@@ -53,7 +53,7 @@ def init(arguments: list[str] | None = None) -> None:
 
 
 def refuse_other_arguments(arguments: list[str] | None = None) -> None:
-    """Raises UserError for arguments that are none of ROS, which rcl passes over; ``arguments``: as of `init`."""
+    """Raises UserError for arguments that are not of ROS, which rcl ignores; ``arguments``: as in `init`."""
     if others := remove_ros_args(arguments)[1:]:
         raise UserError(
             f"unknown arguments {listed(others)}: ROS arguments come after --ros-args, for example "
@@ -62,7 +62,7 @@ def refuse_other_arguments(arguments: list[str] | None = None) -> None:
 
 
 def start_failure(error: Exception) -> tuple[int, str] | None:
-    """(exit status of the node, why ROS did not start and what to do), or None for an error of another kind.
+    """(exit status of the node, reason and remedy), or None for an error of another kind.
 
     error: raised by `init` or the creation of a node.
     """
@@ -88,7 +88,7 @@ def start_failure(error: Exception) -> tuple[int, str] | None:
 
 
 def _sentence(error: Exception) -> str:
-    """On one line, without the places in rcl's sources."""
+    """On one line, without positions in rcl's sources."""
     text = re.sub(r",? at [\w./-]+\.[ch](pp)?:\d+", "", " ".join(str(error).split()))
     return shortened(text.strip(" ,."), LONGEST_MESSAGE)
 
@@ -101,14 +101,14 @@ def _no_log_file() -> str | None:
             return None
     except RuntimeError as error:  # rclpy's: neither HOME nor ROS_LOG_DIR is set
         return _sentence(error)
-    except UnicodeDecodeError as error:  # rclpy's: it takes every path for UTF-8
+    except UnicodeDecodeError as error:  # rclpy's: it decodes every path as UTF-8
         return f"{shortened(error.object)[1:]}: the name of the folder is not UTF-8"
     except OSError as error:
         return f"{folder}: {error.strerror}"
 
 
 def unmet_demand(error: Exception) -> str | None:
-    """Why nothing is started, and what to do; None where security is not demanded or the error is another one.
+    """Why security prevents the start, and the remedy; None if it is not required or the error is another one.
 
     error: raised by rclpy.init or the creation of a node. With ROS_SECURITY_ENABLE=true rcl ends there both if keys are
     missing (ROS_SECURITY_STRATEGY=Enforce) and if the DDS implementation has no security plugins (any strategy).

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""SIGINT and SIGTERM as an event that ends the main loop between two turns, instead of an interruption at any place.
+"""SIGINT and SIGTERM as an event that ends the main loop between two turns, instead of an interruption anywhere.
 
-rclpy's own handlers shut the context down while callbacks run: in one of ten ends the executor then failed on the
-invalid context, or waited forever. Blocking the signals for a thread that waits for them is no way either: threads
-that libraries made at import would take them.
+rclpy's handlers shut the context down while callbacks run: in one of ten shutdowns the executor then failed on the
+invalid context, or waited forever. Blocking the signals for a thread that waits for them does not work either, because
+threads that libraries created at import would receive them.
 """
 
 import contextlib
@@ -17,13 +17,13 @@ from rclpy.task import Future
 
 
 def watch(on_stop: Callable[[], None]) -> None:
-    """Call ``on_stop`` once, from a thread of its own, at the first SIGINT or SIGTERM; later ones do nothing.
+    """Call ``on_stop`` once, from a separate thread, at the first SIGINT or SIGTERM; later ones do nothing.
 
     Call from the main thread, with rclpy's handlers off.
     """
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
-    # Python's handlers run only when the main thread is back from the executor's wait; the byte is written at once.
+    # Python's handlers run only after the main thread returns from the executor's wait; the byte is written at once.
     signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: None)
@@ -48,7 +48,8 @@ def ignore() -> None:
 
 @contextlib.contextmanager
 def collected() -> Iterator[list[int]]:
-    """Gives an empty list, which each SIGINT and SIGTERM within this block fills: for a loop that looks at it.
+    """Yields an empty list, to which each SIGINT and SIGTERM within this block adds an entry, for a loop that checks
+    it.
 
     Call from the main thread, with rclpy's handlers off.
     """
@@ -65,7 +66,7 @@ def collected() -> Iterator[list[int]]:
 
 @contextlib.contextmanager
 def later() -> Iterator[None]:
-    """A SIGINT or SIGTERM within this block becomes a KeyboardInterrupt behind it.
+    """A SIGINT or SIGTERM within this block becomes a KeyboardInterrupt after it.
 
     Inside of rclpy's calls, which call Python back from C++, the exception would come out as another one.
     """
@@ -76,7 +77,7 @@ def later() -> Iterator[None]:
 
 
 def spin(executor: Executor, stop: Future) -> None:
-    """Run the callbacks of ``executor`` until ``stop`` is done, which another thread may see to.
+    """Run the callbacks of ``executor`` until ``stop`` is done, possibly by another thread.
 
     Not spin_until_future_complete: rclpy 7.1 hangs a callback on the future at each turn, 0.4 KB for every message
     that a node receives, and never takes one off (20 MB in half an hour at 40 messages a second).

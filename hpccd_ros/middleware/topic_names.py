@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from hpccd_ros.base.quoting import shortened
 
-if TYPE_CHECKING:  # writers of files need the names and no ROS
+if TYPE_CHECKING:  # writers of files need the names, but no ROS
     from rclpy.node import Node
 
 CONTACTS = "contacts"
@@ -26,12 +26,12 @@ TRANSFORMS_STATIC = "transforms_static"
 TF = "/tf"
 TF_STATIC = "/tf_static"
 
-# A service, and an action, which has services and topics below the name.
+# A service, and an action with services and topics below this name.
 DETECT = "~/detect"
 SERVICES = (DETECT, *(f"{DETECT}/_action/{kind}" for kind in ("send_goal", "cancel_goal", "get_result")))
 
-# What is published of a mesh: its faces, and its positions as MeshVertices or as PointCloud2; or both at once, as
-# shape_msgs/Mesh or visualization_msgs/Marker; or, where it keeps its shape, where that is, as PoseStamped.
+# Topics of a mesh: faces, and positions as MeshVertices or PointCloud2; or both at once, as shape_msgs/Mesh or
+# visualization_msgs/Marker; or, for a rigid mesh, poses as PoseStamped.
 TOPOLOGY = "topology"
 VERTICES = "vertices"
 POINTS = "points"
@@ -40,21 +40,21 @@ MARKER = "marker"
 WHOLE = (SHAPE, MARKER)
 POSE = "pose"
 POSITIONS = (VERTICES, POINTS, *WHOLE, POSE)
-# Of a mesh that keeps its shape and that transforms move: nothing but the shape is published.
+# A rigid mesh that transforms move: only its shape is published.
 BY_TRANSFORMS = "tf"
 INPUTS = (*POSITIONS, BY_TRANSFORMS)
 
 
 def positions(given_as: str) -> tuple[str, ...]:
-    """Those of POSITIONS that a mesh of this parameter ``input``, one of INPUTS, takes; one that keeps its shape has
-    this from its vertices."""
+    """Topics of POSITIONS that a mesh with this parameter ``input``, one of INPUTS, uses; a rigid mesh has its shape
+    from vertices."""
     return {POSE: (POSE, VERTICES), BY_TRANSFORMS: (VERTICES,)}.get(given_as, (given_as,))
 
 
 # A mesh name becomes part of topic and parameter names.
 MESH_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
-# Of each mesh one name below this one.
+# Prefix of the names of topics of meshes.
 MESHES = "meshes/"
 
 
@@ -76,7 +76,7 @@ def points(mesh: str) -> str:
 
 
 def subscribed(meshes: Iterable[str], of_robots: Iterable[str] = ()) -> list[str]:
-    """All that the node may subscribe to. of_robots: topics of descriptions and joint states."""
+    """All topics that the node may subscribe to. of_robots: topics of descriptions and joint states."""
     of_meshes = [of_mesh(mesh, kind) for mesh in meshes for kind in (TOPOLOGY, *POSITIONS)]
     return [*of_meshes, TRANSFORMS, TRANSFORMS_STATIC, TF, TF_STATIC, *of_robots]
 
@@ -87,7 +87,7 @@ def unusable_name(node: Node, subscribed: Iterable[str]) -> str | None:
         for name in names:
             try:
                 resolve(name)
-            # rclpy's. Names of meshes are sound: what is left is their length. Topics of robots may be called anything.
+            # rclpy's. Names of meshes are valid, but may be too long. Topics of robots may have any name.
             except RuntimeError as error:
                 return (
                     f"{shortened(name)}: in namespace {shortened(node.get_namespace())} and with the remappings given, "

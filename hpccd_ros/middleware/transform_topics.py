@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The topics on which transforms come, for the node, its recordings and their replay.
+"""The topics of transforms, for the node, its recordings and their replay.
 
-There is no wheel of tf2_msgs, so geometry_msgs/TransformStamped on ``transforms`` and ``transforms_static`` is always
-understood as well.
+tf2_msgs has no wheel, so geometry_msgs/TransformStamped on ``transforms`` and ``transforms_static`` is always used
+as well.
 """
 
 import dataclasses
@@ -24,7 +24,7 @@ TYPES = (STAMPED, TF2)
 
 @dataclasses.dataclass(frozen=True)
 class TransformTopic:
-    """static: at all times, and latched: each message adds to those before."""
+    """static: valid at all times, and latched: messages accumulate."""
 
     name: str
     type_name: str
@@ -43,7 +43,7 @@ ALL = {
 
 
 def understood() -> list[TransformTopic]:
-    """Those whose message is installed here."""
+    """The topics whose message type is installed."""
     return [topic for topic in ALL.values() if _installed(topic.type_name)]
 
 
@@ -56,7 +56,7 @@ def _installed(type_name: str) -> bool:
 
 
 def fill(buffer: TransformBuffer, message: Any, topic: TransformTopic, sent: int = UNKNOWN_TIME) -> list[Refusal]:
-    """Add the transforms in a message of ``topic``, sent at ``sent``, to ``buffer``. Returns those refused."""
+    """Add the transforms in a message of ``topic``, sent at ``sent``, to ``buffer``. Returns rejected ones."""
     refusals = []
     for stamped in message.transforms if hasattr(message, "transforms") else [message]:
         try:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages that carry vertices and triangles at once, as other programs send them: shape_msgs/Mesh and
-visualization_msgs/Marker. They are read from their CDR bytes: rclpy makes a Python object of each point, 56 ms for a
-marker of 10,000 triangles, and as much again to make an array of them. From the bytes it is half a millisecond.
+"""Messages of other programs with vertices and triangles at once: shape_msgs/Mesh and visualization_msgs/Marker. They
+are read from their CDR bytes, in half a millisecond for a marker of 10,000 triangles. rclpy makes a Python object of
+each point, which takes 56 ms, and as long again to make an array of them.
 """
 
 import zlib
@@ -19,13 +19,13 @@ from hpccd_ros.frames.welding import Welding
 from hpccd_ros.middleware.fields import InvalidMessageError, stamp_to_ns
 from hpccd_ros.middleware.mesh_messages import check_size, usable
 
-# Behind these bytes, which tell the encoding, the message begins, and alignment counts.
+# After these bytes, which are the encoding, the message begins, and with it alignment.
 _HEADER = 4
 _ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
 
 
 class CdrReader:
-    """data: with its header. All raise InvalidMessageError where the bytes are not what they should be."""
+    """data: with its header. All methods raise InvalidMessageError for invalid bytes."""
 
     def __init__(self, data: bytes) -> None:
         order = _ORDERS.get(bytes(data[:2]))
@@ -34,7 +34,7 @@ class CdrReader:
         self._data, self._order, self._at = data, order, _HEADER
 
     def numbers(self, code: str, count: int) -> NDArray:
-        """So many of the kind that numpy calls by this code, in an array of its own."""
+        """``count`` numbers of numpy's type ``code``, in a new array."""
         kind = np.dtype(code)
         if count:  # an empty array is not aligned
             self._at += -(self._at - _HEADER) % kind.itemsize
@@ -74,8 +74,8 @@ class WholeMesh:
 
 
 def mesh_from_shape(data: bytes, sent: int, max_vertices: int, max_faces: int) -> WholeMesh:
-    """sent: when its publisher sent it, ns: the message has no stamp, and a recorder receives it at another time than
-    the node. Raises InvalidMessageError: empty, too large, an index out of range, a coordinate that is none."""
+    """sent: when its publisher sent it, ns, because the message has no stamp, and a recorder receives it at another
+    time than the node. Raises InvalidMessageError: empty, too large, an index out of range, an invalid coordinate."""
     if sent <= 0:
         raise InvalidMessageError(
             Reason.MALFORMED, "its publisher tells no time of sending, the only stamp there is; use another input"
@@ -92,8 +92,8 @@ def mesh_from_shape(data: bytes, sent: int, max_vertices: int, max_faces: int) -
 
 
 def mesh_from_marker(data: bytes, max_vertices: int, max_faces: int, welding: Welding) -> WholeMesh:
-    """Of a marker of type TRIANGLE_LIST: its points by its scale and then its pose. welding: of the markers before it.
-    Raises InvalidMessageError as for shapes, and where it is of another type or does not add a mesh."""
+    """From a marker of type TRIANGLE_LIST: its points, transformed by its scale and then its pose. welding: that of the
+    previous markers. Raises InvalidMessageError as for shapes, and for another type or action."""
     reader = CdrReader(data)
     stamp = stamp_to_ns(Time(sec=reader.number("i4"), nanosec=reader.number("u4")))
     frame_id = reader.text()
@@ -126,12 +126,12 @@ def mesh_from_marker(data: bytes, max_vertices: int, max_faces: int, welding: We
         raise InvalidMessageError(Reason.MALFORMED, f"points has {len(points)} points, not a multiple of 3")
     local, faces = welding.vertices_and_faces(usable(points))
     check_size("vertices", len(local), "max_vertices", max_vertices)
-    # By 1 too, which changes no bit: one way for all.
+    # By 1 too, which changes no bit.
     return WholeMesh(stamp, frame_id, usable(pose.apply(local * scale)), numbered(faces, len(local)))
 
 
 def numbered(faces: np.ndarray, n_vertices: int) -> Topology:
-    """Its version is a check sum of itself: the same for whoever looks at the same mesh, whenever they began."""
+    """Its version is its checksum, so that it is equal for every reader of the same mesh."""
     return Topology(zlib.crc32(np.ascontiguousarray(faces), n_vertices), n_vertices, faces)
 
 

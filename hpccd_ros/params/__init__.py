@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of the node's parameters, and what is made of it: descriptors, scene, documentation."""
+"""The table of the node's parameters, and its uses: descriptors, scene, documentation."""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the parameters say of pairs of meshes: as lists of NAME:NAME:VALUE, and as pairs.NAME.*, side by side.
+"""Parameters of pairs of meshes: lists of NAME:NAME:VALUE, and pairs.NAME.*, which may be mixed.
 
-The name of a robot stands for all of its links, the same one twice for any two of them; what is said of a link beats
-what is said of its robot. Which links a robot has is known once its description has come: ``links`` has (robot ->
-meshes of its links) of those that are known, and what is said of others says nothing yet.
+The name of a robot means all of its links, and twice the same robot any two of them; a setting of a link has priority
+over that of its robot. The links of a robot are known once its description has arrived: ``links`` (robot -> meshes of
+its links) has known robots, and settings of others have no effect yet.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -20,7 +20,7 @@ from hpccd_ros.params.values import ParameterError
 
 @dataclass(frozen=True)
 class _PairSetting:
-    """``value``: of the two meshes or robots ``names``, said by ``parameter`` in this ``text``."""
+    """``value``: for the two meshes or robots ``names``, from ``parameter`` with this ``text``."""
 
     parameter: str
     text: str
@@ -134,7 +134,7 @@ def _distance(text: str) -> float | None:
 
 
 def _structured(settings: dict[str, Any], key: str) -> Iterator[_PairSetting]:
-    """Of the parameters pairs.NAME.key those that say something."""
+    """The parameters pairs.NAME.key that are set."""
     for pair, of in settings[PAIRS].items():
         names = of["meshes"]
         if not _are_names(settings, names):
@@ -148,7 +148,7 @@ def _structured(settings: dict[str, Any], key: str) -> Iterator[_PairSetting]:
 
 
 def _agreed(given: Iterable[_PairSetting]) -> list[_PairSetting]:
-    """One for each pair of meshes. Raises ParameterError where two differ."""
+    """One for each pair of meshes. Raises ParameterError if two differ."""
     found: dict[frozenset[str], _PairSetting] = {}
     for one in given:
         first = found.setdefault(frozenset(one.names), one)
@@ -161,8 +161,8 @@ def _agreed(given: Iterable[_PairSetting]) -> list[_PairSetting]:
 
 
 def _spread(agreed: Sequence[_PairSetting], settings: dict[str, Any], links: Links) -> list[_PairSetting]:
-    """With the links of robots in place of their names. Raises ParameterError: a robot has no such link, or two
-    that differ, each of a robot and a link, meet in a pair of which nothing else is said."""
+    """With the links of robots instead of their names. Raises ParameterError: a robot has no such link, or two
+    different settings, each of a robot and a link, apply to a pair without a setting of its own."""
 
     def robots(one: _PairSetting) -> int:
         return sum(name in settings["robots"] for name in one.names)
@@ -170,7 +170,7 @@ def _spread(agreed: Sequence[_PairSetting], settings: dict[str, Any], links: Lin
     found: dict[frozenset[str], _PairSetting] = {}
     given_by: dict[frozenset[str], _PairSetting] = {}
     clashes: dict[frozenset[str], tuple[_PairSetting, _PairSetting]] = {}
-    # What names robots first: what names one link or both then takes its place.
+    # Settings of robots first: those that name one link or both then replace them.
     for one in sorted(agreed, key=lambda one: -robots(one)):
         within_robot = one.names[0] == one.names[1] and one.names[0] in settings["robots"]
         for a, b in product(*(_meshes(name, one, settings, links) for name in one.names)):
@@ -209,7 +209,7 @@ def _meshes(name: str, given: _PairSetting, settings: dict[str, Any], links: Lin
 
 
 def _are_names(settings: dict[str, Any], names: Sequence[str]) -> bool:
-    """Whether they are two, of meshes, robots or their links."""
+    """Whether they are two names of meshes, robots or their links."""
     return len(names) == 2 and all(
         name in settings["meshes"] or (name.partition("/")[0] in settings["robots"] and not name.endswith("/"))
         for name in names

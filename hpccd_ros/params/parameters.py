@@ -39,12 +39,12 @@ _TYPES = {
 }
 
 
-# A number without a point is an integer to ROS; where a float is wanted, it is one.
+# ROS reads a number without a decimal point as an integer; it is accepted as a float.
 _INTEGERS = {"float": Parameter.Type.INTEGER, "float[]": Parameter.Type.INTEGER_ARRAY}
 
 
 def descriptor(row: Row) -> ParameterDescriptor:
-    """What ``describe_parameters`` shows."""
+    """The result of ``describe_parameters``."""
     out = ParameterDescriptor(name=row.name, type=_TYPES[row.kind], description=row.text, read_only=row.change == NEVER)
     if row.unit:
         out.description += f" [{row.unit}]"
@@ -83,7 +83,7 @@ def declare(node: Node) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
 
 
 def _declare_one(node: Node, row: Row, name: str) -> Any:
-    # An empty list has no element type, so rclpy would declare it as a byte array: declare the type instead, as of one
+    # An empty list has no element type, so rclpy would declare it as a byte array: declare the type instead, like one
     # that need not be set.
     typed = row.kind == "string[]" or row.default in (None, [])
     value = Parameter.Type(_TYPES[row.kind]) if typed else row.default
@@ -112,7 +112,7 @@ def unknown_overrides(node: Node, qos_overrides: Container[str] = ()) -> list[st
 
 
 def _given(node: Node) -> dict[str, Parameter]:
-    return getattr(node, "_parameter_overrides", {})  # rclpy has no public list of what was given
+    return getattr(node, "_parameter_overrides", {})  # rclpy has no public list of given parameters
 
 
 def watch(
@@ -124,9 +124,9 @@ def watch(
     check: Callable[[dict[str, Any], dict[str, dict[str, Any]]], str | None],
     on_change: Callable[[], None],
 ) -> None:
-    """Keep ``settings`` and ``meshes`` up to date with changes at run time; refuse bad ones with a reason.
+    """Update ``settings`` and ``meshes`` at run time; reject invalid changes with a reason.
 
-    configured: whether the life cycle is past `unconfigured`; then only rows that may always change do.
+    configured: whether the life cycle is past `unconfigured`; then only rows with ALWAYS may change.
     check: called with settings and meshes as they would be; returns why they cannot be used, or None.
     on_change: called after each accepted change of a row; other parameters (qos_overrides, use_sim_time) are rclpy's.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the parameters robot.NAME.* say: where the description comes from, and what moves the links."""
+"""The parameters robot.NAME.*: the source of the description, and what moves the links."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,7 +13,7 @@ from hpccd_ros.params.values import ParameterError, robot_rows
 from hpccd_ros.robots.joint_frames import JointFrames
 from hpccd_ros.robots.robot import Robot
 
-#: Those whose description is known.
+#: Robots whose description is known.
 Robots = Mapping[str, Robot]
 NO_ROBOTS: Robots = {}
 #: Robot -> parameters robot.NAME.*.
@@ -21,7 +21,8 @@ RobotValues = Mapping[str, Mapping[str, Any]]
 
 
 def of(parameters: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Robot -> parameters robot.NAME.* out of all those of a node by full name; what is not set has its default."""
+    """Robot -> its parameters robot.NAME.*, from all parameters of a node by full name; those not set have their
+    default."""
     return {
         robot: {
             row.name: row.default if (value := parameters.get(name)) is None else value
@@ -37,7 +38,7 @@ def comes_on_topic(description: str) -> bool:
 
 
 def topics(robots: RobotValues) -> dict[str, str]:
-    """Robot -> topic of its description, of those that have theirs from one."""
+    """Robot -> topic of its description, for robots with one."""
     return {name: values["description"] for name, values in robots.items() if comes_on_topic(values["description"])}
 
 
@@ -56,7 +57,7 @@ def subscribed(robots: RobotValues) -> list[str]:
 
 
 def need_transforms(robots: RobotValues) -> bool:
-    """Whether transforms move one of them, or its base."""
+    """Whether transforms move a robot, or its base."""
     return any(not (values["joint_states"] and values["pose"]) for values in robots.values())
 
 
@@ -94,7 +95,7 @@ def unusable_home(robots: RobotValues) -> str | None:
 
 
 def _unplaced(prefix: str, values: Mapping[str, Any]) -> str:
-    """That neither a pose nor a frame says where the links are, and what to give."""
+    """The error if neither a pose nor a frame places the links, with the remedy."""
     if values["joint_states"]:
         return (
             f"{prefix}.pose: not given, so that transforms place the root link; give it, or set parameter frame_id, "
@@ -127,8 +128,8 @@ def links(robots: Robots) -> dict[str, tuple[str, ...]]:
 
 
 def mesh_settings(settings: dict[str, Any], robots: Robots) -> tuple[MeshSettings, ...]:
-    """Of all links, in the order of parameter ``robots`` and of the descriptions. A robot that is not known is a mesh
-    of its own, of which no frame ever comes: without it no step can be answered."""
+    """Settings of all links, in the order of the parameter ``robots`` and of the descriptions. An unknown robot is a
+    mesh whose frames never arrive, because no step can be computed without it."""
     found: list[MeshSettings] = []
     for name, values in settings[ROBOT].items():
         if name in robots:
@@ -139,7 +140,7 @@ def mesh_settings(settings: dict[str, Any], robots: Robots) -> tuple[MeshSetting
 
 
 def followers(settings: dict[str, Any], robots: Robots, most_waiting: int) -> dict[str, JointFrames]:
-    """Robot -> frames of its links, of those that joint states move."""
+    """Robot -> frames of its links, for robots that joint states move."""
     return {
         name: JointFrames(
             robots[name],

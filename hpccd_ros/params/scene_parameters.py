@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the parameters say of the scene: meshes, what is computed of them, where positions are placed."""
+"""Parameters of the scene: meshes, what is computed, placement of positions."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -59,8 +59,8 @@ def frame_pipeline(
     robots: Robots = NO_ROBOTS,
     followers: Iterable[Follower] = (),
 ) -> FramePipeline:
-    """The way from messages of the meshes to frames of the scene; it has the topologies of robots. followers: of robots
-    that joint states move. Raises ValueError: nothing in the scene moves."""
+    """The pipeline from messages of the meshes to frames of the scene, with the topologies of robots. followers: of
+    robots that joint states move. Raises ValueError if nothing in the scene moves."""
     nearest = settings["stamp_match"] == "nearest"
     rules = AssemblyRules(
         max_pending=max_pending,
@@ -77,7 +77,7 @@ def frame_pipeline(
 
 
 def detector_options(settings: dict[str, Any], robots: Robots = NO_ROBOTS) -> Options:
-    """What the node's detector computes, and how."""
+    """Options of the node's detector."""
     outputs = set(settings["outputs"])
     wanted = pair_parameters.separation(settings, robot_parameters.links(robots))
     if settings["markers"]:
@@ -98,7 +98,7 @@ def detector_options(settings: dict[str, Any], robots: Robots = NO_ROBOTS) -> Op
 
 
 def rigid(settings: dict[str, Any]) -> RigidOptions:
-    """How steps are cut in which meshes move by poses."""
+    """How steps with meshes that move by poses are cut."""
     return RigidOptions(settings["rigid_tolerance"], settings["rigid_parts"])
 
 
@@ -124,12 +124,12 @@ def poses(meshes: MeshValues) -> dict[str, Rigid]:
 
 
 def check(settings: dict[str, Any], meshes: MeshValues, robots: Robots = NO_ROBOTS) -> None:
-    """What the values cannot tell one by one. robots: those that are known. Raises ParameterError."""
+    """Check values that depend on each other. robots: known robots. Raises ParameterError."""
     pair_parameters.check(settings, robot_parameters.links(robots))
     robot_parameters.check(settings)
     features(settings)
     poses(meshes)
-    # Of a robot that is not known, nobody knows which links it has.
+    # The links of an unknown robot are unknown.
     if set(settings["robots"]) <= set(robots):
         check_stop(settings, scene_builder(settings, meshes, robots))
     for name, values in meshes.items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values of the node's parameters: which ones the table allows. Whether they come from a node or from a file."""
+"""Checks of parameter values against the table, whether they come from a node or a file."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -10,7 +10,7 @@ from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS, PAIR_ROWS, PAIRS, ROBOT
 
 
 class ParameterError(ValueError):
-    """A parameter that the node cannot start with; the text names it and the remedy."""
+    """An invalid parameter; the text names it and the remedy."""
 
 
 def unusable_value(row: Row, value: Any) -> str | None:
@@ -49,7 +49,7 @@ def normalise(row: Row, value: Any) -> Any:
 
 
 def expected(row: Row) -> str:
-    """Which type, with an example."""
+    """The type, with an example."""
     return f"expected {row.kind}" + (f", e.g. {row.default!r}" if row.default is not None else "")
 
 
@@ -106,7 +106,7 @@ def _checked_value(row: Row, name: str, value: Any) -> Any:
 
 
 def check_names(settings: dict[str, Any]) -> None:
-    """Of meshes and robots. Raises ParameterError for one that cannot be part of a topic, or is there twice."""
+    """Names of meshes and robots. Raises ParameterError for one that is invalid in a topic, or is repeated."""
     for parameter in ("meshes", "robots"):
         names = settings[parameter]
         for name in names:
@@ -122,8 +122,8 @@ def check_names(settings: dict[str, Any]) -> None:
 
 
 def pair_names(given: Iterable[str]) -> list[str]:
-    """Each NAME of parameters pairs.NAME.* among the full names ``given``. Raises ParameterError for one that is none
-    of them."""
+    """Each NAME of parameters pairs.NAME.* among the full names ``given``. Raises ParameterError for an invalid
+    one."""
     keys, found = [row.name for row in PAIR_ROWS], set()
     for name in sorted(given):
         first, _, rest = name.partition(".")
