@@ -31,7 +31,7 @@ py::array hand_over(std::vector<Row>&& rows, Columns... columns) {
   return py::array_t<T>(shape, reinterpret_cast<const T*>(owner->data()), free);
 }
 
-// Of a numpy array, or of an array on a device, which the caller keeps.
+// Positions in a numpy array, or in an array on a device, which the caller keeps alive.
 struct GivenPositions {
   Positions positions;
 
@@ -104,7 +104,7 @@ struct ArithmeticContext {
   std::optional<StandardArithmetic> entered;
 };
 
-// Of a hpccd_core.Contacts; `kept` holds its arrays.
+// The arrays of a hpccd_core.Contacts; `kept` holds references to them.
 ContactsOfPart part_of(const py::handle& contacts, double part, double parts, std::vector<py::array>& kept) {
   const auto read = [&]<class Row>(const char* name, std::span<const Row>& rows, auto number) {
     const auto array = py::cast<Array<decltype(number)>>(contacts.attr(name));
@@ -137,7 +137,7 @@ std::size_t n_features(GapKind kind) {
   return kind == GapKind::none ? 0 : kind == GapKind::vertex_face ? 2 : kind == GapKind::edge_edge ? 4 : 3;
 }
 
-// (mesh_a, mesh_b, distance, kind, features, points) of each.
+// (mesh_a, mesh_b, distance, kind, features, points) of each gap.
 py::list to_list(const std::vector<Gap>& gaps) {
   py::list l;
   for (const Gap& g : gaps) {
@@ -150,7 +150,7 @@ py::list to_list(const std::vector<Gap>& gaps) {
   return l;
 }
 
-// Arrays of rows where they are, which hold their memory.
+// Arrays that refer to rows in place and hold their memory.
 py::dict in_place(const DeviceResults& r) {
   const py::capsule owner(new std::shared_ptr<const void>(r.memory),
                           [](void* p) { delete static_cast<std::shared_ptr<const void>*>(p); });
@@ -178,13 +178,14 @@ auto unlocked(Query&& query) {
   return query();
 }
 
-// The result of a query, with its rows where the detector's options want them.
+// The result of a query, with its rows where the detector's options require them.
 template <class OnDevice, class OnHost>
 py::dict rows_where_asked(const Detector& d, OnDevice&& on_device, OnHost&& on_host) {
   return d.options().results_on_device ? to_dict(unlocked(on_device), d.options().worlds) : to_dict(unlocked(on_host));
 }
 
-// For what takes less than to get the interpreter back, which may be a whole turn of another thread.
+// For queries that take less time than reacquiring the interpreter lock, which may take a whole time slice of another
+// thread.
 template <class Query>
 auto unlocked_if_busy(const Detector& d, Query&& query) {
   std::optional<py::gil_scoped_release> release;
@@ -293,7 +294,7 @@ PYBIND11_MODULE(_core, m) {
       .def_readwrite("worlds", &Options::worlds);
 
   py::class_<Detector>(m, "Detector")
-      // A copy: what is added to the caller's scene later does not reach this detector.
+      // Copies the scene: later changes of the caller's scene do not affect this detector.
       .def(py::init([](const Scene& scene, const Options& options) {
              return std::make_unique<Detector>(std::make_shared<const Scene>(scene), options);
            }),

@@ -39,7 +39,7 @@ struct DLManagedTensor {
 };
 constexpr std::int32_t on_cuda = 2;
 
-// A C-contiguous array in a device's memory, which is held as long as anybody looks at it.
+// A C-contiguous array in a device's memory, which is held as long as there are references to it.
 struct DeviceArray {
   std::shared_ptr<const void> memory;
   const void* data;
@@ -62,7 +62,7 @@ py::dict interface_of(const DeviceArray& a) {
   d["data"] = py::make_tuple(a.size() ? reinterpret_cast<std::uintptr_t>(a.data) : 0, false);
   d["version"] = 3;
   d["strides"] = py::none();
-  d["stream"] = py::none();  // what it holds is complete
+  d["stream"] = py::none();  // its contents are complete
   return d;
 }
 
@@ -84,7 +84,7 @@ py::capsule dlpack_of(const DeviceArray& a) {
   e->managed.context = e;
   e->managed.deleter = [](DLManagedTensor* m) { delete static_cast<Exported*>(m->context); };
   return py::capsule(&e->managed, "dltensor", [](PyObject* capsule) {
-    // A consumer renames what it has taken, and calls the deleter itself.
+    // A consumer renames the capsule when it takes the array, and calls the deleter itself.
     if (!PyCapsule_IsValid(capsule, "dltensor")) return;
     auto* m = static_cast<DLManagedTensor*>(PyCapsule_GetPointer(capsule, "dltensor"));
     m->deleter(m);
@@ -101,7 +101,7 @@ DeviceArray rows_of(const DeviceArray& a, std::int64_t begin, std::int64_t end) 
   return part;
 }
 
-// To take memory and to copy may wait for the device: other threads of Python go on meanwhile.
+// Allocation and copies may wait for the device: other Python threads continue meanwhile.
 std::shared_ptr<const void> copied_there(const void* a, std::size_t a_bytes, const void* b, std::size_t b_bytes,
                                          int device) {
   py::gil_scoped_release release;
@@ -135,7 +135,7 @@ py::array to_host(const DeviceArray& a) {
   return to;
 }
 
-// Else numpy makes an array of one object, silently.
+// Otherwise numpy silently makes an array of one object.
 [[noreturn]] void refuse_numpy(const DeviceArray&, const py::object&, const py::object&) {
   throw py::type_error("numpy: this array is in a GPU's memory, which numpy cannot read; .to_host() gives a copy");
 }
@@ -212,7 +212,7 @@ py::dict to_dict(const DeviceResults& r, std::uint32_t n_worlds) {
 
 namespace {
 
-// Where a prepared detection writes, each time.
+// The output arrays of a prepared detection.
 py::dict arrays_of(const PreparedDetection& d, std::uint32_t n_worlds) {
   const PreparedResults& p = d.results();
   const auto array = [&](const void* data, char kind, int item_bytes, std::vector<std::int64_t> shape) {

@@ -10,7 +10,7 @@ namespace hpccd {
 
 void bind_device_array(pybind11::module_& m);
 
-// Arrays by name, as of results on the host; what a query does not give is left out.
+// Arrays by name, as for results on the host; those that a query does not have are left out.
 pybind11::dict to_dict(const DeviceResults& results, std::uint32_t n_worlds);
 
 void bind_prepared(pybind11::module_& m);

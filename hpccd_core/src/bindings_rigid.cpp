@@ -26,12 +26,12 @@ using Doubles = py::array_t<double, py::array::c_style>;
 
 constexpr std::size_t many_vertices = 10'000;
 
-// How Python sees them: rows of numbers.
+// The layout that Python sees: rows of numbers.
 static_assert(sizeof(Vector) == 3 * sizeof(double) && sizeof(Pose) == 7 * sizeof(double));
 
 std::span<const double> numbers(const Doubles& a) { return {a.data(), static_cast<std::size_t>(a.size())}; }
 
-// float64 arrays as they are; other arrays and numbers if float64 can hold them exactly. Errors name the argument.
+// float64 arrays in place; other arrays and numbers if float64 can hold them exactly. Errors name the argument.
 Doubles doubles(const char* name, const py::object& given) {
   // Not for subclasses: a masked array is more than its numbers.
   const bool plain = Py_TYPE(given.ptr()) == py::detail::npy_api::get().PyArray_Type_;

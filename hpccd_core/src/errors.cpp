@@ -3,7 +3,7 @@
 
 namespace hpccd {
 
-// Here rather than in the header: their type information then stands in the library once, for all who catch them.
+// Not inline, so that the library contains their type information once, for all users.
 InvalidArgument::~InvalidArgument() = default;
 Cancelled::Cancelled() : std::runtime_error("the detection was cancelled") {}
 Cancelled::~Cancelled() = default;

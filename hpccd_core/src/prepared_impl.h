@@ -11,7 +11,7 @@ namespace hpccd {
 
 struct PreparedDetection::Impl {
   std::mutex one_call;
-  std::shared_ptr<const void> detector;  // whose scene and rules the pipeline reads
+  std::shared_ptr<const void> detector;  // the pipeline refers to its scene and rules
   std::unique_ptr<gpu::Pipeline> pipeline;
   PreparedResults results;
 };

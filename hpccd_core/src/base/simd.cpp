@@ -36,7 +36,7 @@ Simd resolve(Simd wanted) {
 
 }  // namespace hpccd
 
-// Outside of the namespace: what is declared in its inline one would be declared anew inside.
+// Outside of the namespace: inside, a declaration of the inline namespace would be declared again.
 std::vector<hpccd::Simd> hpccd::simd_levels() {
   std::vector<Simd> levels{Simd::scalar};
 #if defined(HPCCD_X86)

@@ -110,7 +110,7 @@ void test_queries(Kind kind, std::span<const Query> queries, const Options& opti
 }  // namespace
 }  // namespace hpccd
 
-// Outside of the namespace: what is declared in its inline one would be declared anew inside.
+// Outside of the namespace: inside, a declaration of the inline namespace would be declared again.
 void hpccd::test_vertex_face(std::span<const Query> queries, const Options& options, bool* hit, double* toc) {
   test_queries(Kind::vertex_face, queries, options, hit, toc);
 }

@@ -67,7 +67,7 @@ class DevicePositions {
     check(cudaStreamWaitEvent(stream, made_, 0), "cudaStreamWaitEvent");
   }
 
-  // Throws InvalidArgument where the caller's stream is none of this device; it may be captured.
+  // Throws InvalidArgument if the caller's stream is not a stream of this device; it may be under capture.
   void require_stream(cudaStream_t callers, cudaStream_t ours) const {
     cudaStreamCaptureStatus captured = cudaStreamCaptureStatusNone;
     const cudaError_t result = cudaStreamIsCapturing(callers, &captured);
@@ -78,7 +78,7 @@ class DevicePositions {
   std::size_t bytes() const { return given_[0].bytes() + given_[1].bytes(); }
 
  private:
-  // Where the same event can be recorded on a stream of ours, the device has not failed: the caller's stream is none.
+  // If the same event can be recorded on our own stream, the device has not failed: the caller's stream is invalid.
   void record(cudaStream_t callers, cudaStream_t ours) {
     cudaStreamCaptureStatus captured = cudaStreamCaptureStatusNone;
     cudaError_t result = cudaStreamIsCapturing(callers, &captured);
@@ -93,14 +93,14 @@ class DevicePositions {
   }
 
   InvalidArgument no_stream(cudaError_t result) const {
-    cudaGetLastError();  // the next call starts clean
+    cudaGetLastError();  // clears the error
     return InvalidArgument("stream: is no stream of CUDA device " + std::to_string(device_) +
                            ", where this detector works (" + cudaGetErrorString(result) +
                            "); give one of that device, or none");
   }
 
-  // The device on which an array of the caller lies. Its producer may still be at work: the stream's later work waits
-  // for it, or it has ended when this returns.
+  // The device on which the caller's array lies. Its producer may still be running: the stream's later work waits for
+  // it, or it has ended when this returns.
   int settled_device(const Positions& array, cudaStream_t stream) {
     cudaPointerAttributes a;
     check(cudaPointerGetAttributes(&a, array.data), "cudaPointerGetAttributes");
@@ -112,7 +112,7 @@ class DevicePositions {
     check(cudaSetDevice(where), "cudaSetDevice");
     check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");
     check(cudaSetDevice(device_), "cudaSetDevice");
-    check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");  // rows here may still be read
+    check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");  // rows here may still be in use
     return where;
   }
 

@@ -18,7 +18,7 @@ namespace hpccd::gpu {
 
 class DeviceScene {
  public:
-  // On the current device. Throws Error where the scene has too many features for 31-bit numbers.
+  // On the current device. Throws Error if the scene has too many features for 31-bit numbers.
   DeviceScene(const Scene& scene, const Features& features, Accuracy accuracy, TestedFeatures tested,
               const SeparationTable& separations, u32 n_worlds)
       : features_(features), separations_(separations), n_worlds_(n_worlds) {
@@ -51,10 +51,10 @@ class DeviceScene {
     params.keys = keys_;
   }
 
-  // What a frame of motions looks for, by the separations of the last update_separations().
+  // The query of a frame of motions, by the separations of the last update_separations().
   Query query_now() const { return any_separation_ ? Query::separations : Query::contacts; }
-  bool all_fast() const { return all_fast_; }  // all that is tested
-  // Brings the separations to the device, where they have changed; to be called before a frame of motions.
+  bool all_fast() const { return all_fast_; }  // all pairs that are tested
+  // Copies the separations to the device if they have changed; must be called before a frame of motions.
   void update_separations() {
     any_separation_ = separations_.any(), one_separation_ = separations_.uniform();
     separation_ = any_separation_ && one_separation_ ? separations_.first() : 0;

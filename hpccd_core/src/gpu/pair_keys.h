@@ -15,8 +15,8 @@ namespace hpccd::gpu {
 struct PairKeys {
   u32 second_bits = 0, pair_bits = 0;  // of a key's second feature; of both features
 
-  // For a scene with so many features. An edge may be first and second, a vertex first, a face second. First features
-  // are numbered through all worlds, second ones in their own.
+  // For a scene with these numbers of features. An edge may be first and second, a vertex first, a face second. First
+  // features are numbered through all worlds, second ones in their own.
   static PairKeys of(std::size_t n_vertices, std::size_t n_edges, std::size_t n_faces, std::size_t n_worlds) {
     const auto bits = [](std::size_t n) { return static_cast<u32>(std::bit_width(std::max<std::size_t>(n, 1) - 1)); };
     const u32 first = std::max<u32>(1, std::max(bits(n_vertices * n_worlds), bits(n_edges * n_worlds))),

@@ -82,7 +82,7 @@ void Communication::work() {
       std::fill(under_way_.begin(), under_way_.end(), std::size_t{0});
       queued_ = 0;
     }
-    // The frame goes on without this thread until the caller knows.
+    // The frame continues without this thread until the caller is informed.
     for (ActiveWait wait; stage_ != Stage::draining && stage_ != Stage::canceled;) wait.turn();
     stage_.store(Stage::idle, std::memory_order_release);
   }
@@ -95,7 +95,7 @@ void Communication::frame() {
   for (auto& device : devices_) device->begin_traversal(leaves_);
   ActiveWait wait;
   for (std::size_t turns_without = 0;;) {
-    // Looked at first: what comes to light afterwards in a whole round of the window was full before.
+    // Read first: segments that are found later in a whole round of the window were full before.
     const Stage stage = stage_.load(std::memory_order_acquire);
     if (stage == Stage::canceled) return;
     const bool sent = send(stage == Stage::draining), taken = collect_ready(), handed = hand_out();
@@ -110,7 +110,7 @@ void Communication::frame() {
 }
 
 void Communication::wait_for_traversal() {
-  // Threads ask for segments before the traversal begins, and each gets its two.
+  // Threads request segments before the traversal begins, and each gets its two.
   for (ActiveWait wait; stage_ == Stage::positions;)
     if (!hand_out()) wait.turn();
 }
@@ -121,8 +121,8 @@ std::size_t Communication::Element::segments() const {
   return n;
 }
 
-// One run of consecutive segments, as published. When the traversal has ended, all that is left goes together: segments
-// that were not filled up lie anywhere, and a call for each would be what the frame waits for.
+// One run of consecutive segments, as published. When the traversal has ended, all remaining segments are sent
+// together: partial segments may be anywhere, and one call for each would delay the frame.
 std::vector<Run> Communication::pop_runs(bool all) {
   std::vector<Run> runs;
   for (std::size_t looks = all ? queue_.size() / queue_.window() + 1 : 1; looks > 0; --looks)

@@ -30,12 +30,12 @@ class Communication {
   Communication(const Communication&) = delete;
   Communication& operator=(const Communication&) = delete;
 
-  // In this order in each frame, from one thread; the first two return at once.
+  // Called in this order in each frame, from one thread; the first two return immediately.
   void begin_frame(Positions t0, Positions t1);
   void begin_traversal(const LeafTable& leaves);
-  // All segments were set full: returns when the devices have finished, or failed.
+  // All segments must be full: returns when the devices have finished, or failed.
   void finish();
-  // Instead of finish, at any time in a frame: returns when nobody uses the frame's positions any longer.
+  // Instead of finish, at any time in a frame: returns when the frame's positions are no longer in use.
   void cancel();
 
   // Whether the devices lag behind: more segments are in the GPU task queue than the GPUs have cores (multiprocessors).

@@ -42,7 +42,7 @@ class CudaTestDevice final : public TestDevice {
   void begin_traversal(const LeafTable& leaves) override {
     check(cudaSetDevice(device_), "cudaSetDevice");
     if (leaves.version != leaves_version_) {
-      leaves_version_ = 0;  // none, should this fail
+      leaves_version_ = 0;  // none, if this fails
       leaves_.set(features_, *leaves.leaves, *leaves.face_of_slot, *leaves.edge_of_slot, *leaves.vertex_of_slot);
       leaves_version_ = leaves.version;
     }
@@ -64,7 +64,7 @@ class CudaTestDevice final : public TestDevice {
   bool ready(Ticket ticket) override {
     Slot& s = slots_[ticket];
     if (!s.data_ready()) return false;
-    check(cudaSetDevice(device_), "cudaSetDevice");  // lists that grow must not end up on another one
+    check(cudaSetDevice(device_), "cudaSetDevice");  // lists that grow must stay on this device
     if (!s.grow(largest_)) return true;
     ++resubmitted_;
     launch(s);
@@ -93,8 +93,8 @@ class CudaTestDevice final : public TestDevice {
   }
 
  private:
-  // Enough to keep an H100 busy; where all are under way, segments gather for longer runs (with 2 a frame of 2 to 6 ms
-  // takes 5 to 20 % longer, with 16 single segments are sent and it takes half as long again).
+  // Enough to keep an H100 busy; while all are in use, segments accumulate to longer runs (with 2, frames of 2 to 6 ms
+  // take 5 to 20 % longer; with 16, single segments are sent and frames take half as long again).
   static constexpr std::size_t n_slots = 8;
 
   template <class T>
@@ -110,11 +110,11 @@ class CudaTestDevice final : public TestDevice {
     return params;
   }
 
-  // Through page-locked memory: only from there does a copy go on by itself.
+  // Through page-locked memory: only copies from there are asynchronous.
   template <class T>
   void upload_positions(Positions t0, Positions t1) {
     check(cudaSetDevice(device_), "cudaSetDevice");
-    check(cudaEventSynchronize(ready_), "cudaEventSynchronize");  // the last frame's copies have left the memory
+    check(cudaEventSynchronize(ready_), "cudaEventSynchronize");  // the copies of the last frame have left the memory
     LaunchParams<T> params = launch_params<T>();
     const Positions ends[2] = {t0, t1};
     const std::size_t bytes = 3 * t0.n * sizeof(T), words = std::max<std::size_t>((bytes + 7) / 8, 1);
@@ -162,7 +162,7 @@ class CudaTestDevice final : public TestDevice {
   PinnedBuffer<double> staging_[2];
   DeviceBuffer<double> given_[2];
   DeviceMotion motion_;
-  DeviceBuffer<Counters> counters_;  // of the extent; each slot has its own for the tests
+  DeviceBuffer<Counters> counters_;  // counters of the extent; each slot has its own for the tests
   std::vector<Slot> slots_;
   LargestLists largest_;
   std::uint64_t resubmitted_ = 0;

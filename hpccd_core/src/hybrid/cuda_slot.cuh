@@ -13,11 +13,11 @@
 
 namespace hpccd::hybrid {
 
-using namespace gpu;  // only device code includes this
+using namespace gpu;  // included by device code only
 
 static_assert(sizeof(LeafPair) == sizeof(uint2));
 
-// What differs between submissions of one slot; in page-locked memory, where the device reads it.
+// Values that differ between submissions of one slot; in page-locked memory, which the device reads.
 struct Submission {
   u64 leaf_pairs;
   u32 number;
@@ -31,7 +31,7 @@ static __global__ void begin_submission_kernel(Counters* counters, const Submiss
   if (threadIdx.x == 0) counters->leaf_pairs = submission->leaf_pairs;
 }
 
-// The state variable of an element of the GPU task queue becomes "data ready", after everything that it announces.
+// Sets the state variable of an element of the GPU task queue to "data ready", after all data that it announces.
 static __global__ void data_ready_kernel(const Counters* counters, Counters* to_host, u32* state,
                                          const Submission* submission) {
   *to_host = *counters;
@@ -39,7 +39,7 @@ static __global__ void data_ready_kernel(const Counters* counters, Counters* to_
   *reinterpret_cast<volatile u32*>(state) = submission->number;
 }
 
-// What a slot's lists had to grow to: what was too short in one will be in the others.
+// The sizes to which a slot's lists have grown: the other slots need them too.
 struct LargestLists {
   TestLists::Sizes lists{};
   std::size_t found = 0;
@@ -47,7 +47,7 @@ struct LargestLists {
 
 class Slot {
  public:
-  // A start: lists grow where they overflow, and what one slot has learnt the others begin with.
+  // Initial sizes: lists grow when they overflow, and other slots begin with the sizes of this one.
   Slot() : lists_(std::size_t{1} << 17, std::size_t{1} << 15, std::size_t{1} << 12) {
     counters_.reserve(1);
     host_counters_.reserve(1);
@@ -63,8 +63,8 @@ class Slot {
   // The pairs of the next launches.
   void assign(const std::vector<Piece>& pieces) { sent_ = pieces; }
 
-  // They are tested when the event has come. `params` names the frame's scene, leaves and motion: the same places as in
-  // the last launch where `version` is the same.
+  // Tests them after the event. `params` refers to the frame's scene, leaves and motion, at the same addresses as in
+  // the last launch if `version` is the same.
   template <class T>
   void launch(const DeviceScene& scene, LaunchParams<T> params, std::uint64_t version, const LargestLists& largest,
               cudaEvent_t after, int multiprocessors) {
@@ -88,13 +88,13 @@ class Slot {
 
   bool data_ready() {
     if (std::atomic_ref<u32>(*state_.data()).load(std::memory_order_acquire) == submission_.data()->number) return true;
-    // A kernel that failed never says so: its stream does. To ask it costs more than to look at the state.
+    // A failed kernel does not report it: its stream does. Querying the stream costs more than reading the state.
     if (++looks_ % 1024 == 0)
       if (const cudaError_t e = cudaStreamQuery(stream_); e != cudaErrorNotReady) check(e, "cudaStreamQuery");
     return false;
   }
 
-  // When data is ready: makes room where a list was too short. True where the pairs must be tested again.
+  // When data is ready: enlarges lists that were too short. True if the pairs must be tested again.
   bool grow(LargestLists& largest) {
     const Counters& c = *host_counters_.data();
     bool again = lists_.grow(c, TestLists::From::leaves);
@@ -112,9 +112,9 @@ class Slot {
   void append_to(Output& output, const DeviceScene& scene) const {
     const Counters& c = *host_counters_.data();
     gpu::require_balance(c, false);
-    // All or nothing: what fails here is tested again by the CPU.
+    // All or nothing: on a failure here the CPU tests the pairs again.
     const auto make_room = [](auto& list, std::size_t more) {
-      // Twice as much at least: segments are many, and each would copy those before it.
+      // At least doubles the capacity: with many segments, each would otherwise copy all previous ones.
       if (const std::size_t n = list.size() + more; n > list.capacity()) list.reserve(std::max(n, 2 * list.capacity()));
     };
     make_room(output.vertex_face, c.found[0]);
@@ -129,7 +129,7 @@ class Slot {
     for (int k = 0; k < 2; ++k) output.counts[k] += batch_counts(c, k);
   }
 
-  // Whatever was under way has ended, well or not.
+  // Waits for all running work, whether or not it succeeds.
   void drain() {
     cudaStreamSynchronize(stream_);
     busy = false;
@@ -140,16 +140,16 @@ class Slot {
  private:
   void reserve_found(std::size_t n) {
     if (n <= found_capacity_) return;
-    found_capacity_ = 0;  // should one of these fail, the others have changed
+    found_capacity_ = 0;  // if one of these fails, the others have changed
     keys_.reserve(n);
     tocs_.reserve(n);
     found_capacity_ = n;
   }
 
-  // The kernels between the copy and "data ready", anew where something that they name has changed.
+  // The kernels between the copy and "data ready", recorded again if something that they refer to has changed.
   template <class T>
   void record(const DeviceScene& scene, LaunchParams<T> params, std::uint64_t version, int multiprocessors) {
-    // Places as well as sizes: after a failed allocation a buffer may come back as large as it was, elsewhere.
+    // Addresses as well as sizes: after a failed allocation a buffer may have the same size at another address.
     std::vector<std::uintptr_t> now{sizeof(T), version, lists_.n_segments(), scene.separations_version()};
     const auto depends_on = [&](const auto& buffer) {
       now.push_back(reinterpret_cast<std::uintptr_t>(buffer.data()));
@@ -184,9 +184,9 @@ class Slot {
   PinnedBuffer<u64> keys_;
   PinnedBuffer<double> tocs_;
   PinnedBuffer<u32> state_;
-  PinnedBuffer<Submission> submission_;  // its number is what the state shows when it is ready
+  PinnedBuffer<Submission> submission_;  // its number is the state when data is ready
   Graph graph_;
-  std::vector<std::uintptr_t> recorded_;  // what the graph depends on, as it was
+  std::vector<std::uintptr_t> recorded_;  // the values on which the graph depends, when it was recorded
   std::vector<Piece> sent_;
   u32 looks_ = 0;
 };

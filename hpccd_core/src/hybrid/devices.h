@@ -11,8 +11,8 @@
 
 namespace hpccd::hybrid {
 
-// The first `gpus` of them, 0: all. Scene, features and separations must outlive them; separations may change between
-// frames. Throws gpu::Error where there are none, or too little memory.
+// The first `gpus` devices, 0: all. Scene, features and separations must outlive them; separations may change between
+// frames. Throws gpu::Error if there are none, or too little memory.
 std::vector<std::unique_ptr<TestDevice>> cuda_devices(const Scene& scene, const Features& features, Accuracy accuracy,
                                                       TestedFeatures tested, const SeparationTable& separations,
                                                       int gpus);

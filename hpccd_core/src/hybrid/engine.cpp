@@ -9,7 +9,7 @@
 namespace hpccd::hybrid {
 namespace {
 
-// Two in each thread's hands and as many on the way.
+// Two segments held by each thread and as many being sent.
 std::size_t enough_segments(const Sizes& sizes, const ThreadPool& pool) {
   return std::max(sizes.segments, 4 * static_cast<std::size_t>(pool.size()));
 }
@@ -58,7 +58,7 @@ void Engine::cancel(std::vector<Worker>& workers) {
   reset();
 }
 
-// All that was handed over and has not come back.
+// All pairs that were handed over and have not come back.
 std::vector<LeafPair> Engine::untested() const {
   std::vector<LeafPair> pairs;
   for (SegmentNumber s = 0; s < queue_.size(); ++s)

@@ -16,7 +16,7 @@ struct Sizes {
   std::size_t segments = 128, segment_pairs = 2048;
 };
 
-// What the devices leave to the caller: nothing, unless one has failed.
+// The work that the devices leave to the caller: none, unless one has failed.
 struct Finished {
   bool complete;                   // false: see Engine::error()
   std::vector<LeafPair> untested;  // to be tested by the caller
@@ -24,16 +24,16 @@ struct Finished {
 
 class Engine {
  public:
-  // At least one device. Queues too short for the threads (four segments each) are lengthened.
+  // Requires at least one device. Queues that are too short for the threads (four segments each) are lengthened.
   Engine(Communication::Devices devices, const Sizes& sizes, ThreadPool& pool);
 
-  // Returns at once. The positions must stay unchanged until finish() or cancel() has returned.
+  // Returns immediately. The positions must not change until finish() or cancel() has returned.
   void begin_frame(Positions t0, Positions t1) { communication_.begin_frame(t0, t1); }
-  // The workers' pairs go to the devices from here on.
+  // From now on the workers' pairs go to the devices.
   void begin_traversal(const LeafTable& leaves, std::vector<Worker>& workers);
-  // Waits for the devices; afterwards the workers hold what they found.
+  // Waits for the devices; afterwards the workers hold the contacts.
   Finished finish(std::vector<Worker>& workers, Profiler& profiler);
-  // Where a frame cannot go on.
+  // For a frame that cannot continue.
   void cancel(std::vector<Worker>& workers);
 
   const std::string& error() const { return communication_.error(); }

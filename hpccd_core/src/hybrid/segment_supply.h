@@ -11,7 +11,7 @@ namespace hpccd::hybrid {
 
 class alignas(64) SegmentSupply {
  public:
-  // The CPU thread's side.
+  // For the CPU thread.
   void request() { wanted_.fetch_add(1, std::memory_order_release); }
   std::optional<SegmentNumber> receive() {
     for (auto& place : places_)
@@ -19,7 +19,7 @@ class alignas(64) SegmentSupply {
     return std::nullopt;
   }
 
-  // The communication thread's side.
+  // For the communication thread.
   bool wanted() const { return wanted_.load(std::memory_order_acquire) > 0; }
   void give(SegmentNumber s) {
     wanted_.fetch_sub(1, std::memory_order_relaxed);
@@ -28,7 +28,7 @@ class alignas(64) SegmentSupply {
       if (place.compare_exchange_strong(nothing, s, std::memory_order_release)) return;
     }
   }
-  // While no CPU thread is at work: as at the start, two segments are wanted.
+  // While no CPU thread is working: as initially, two segments are requested.
   void reset() {
     for (auto& place : places_) place = none;
     wanted_ = 2;

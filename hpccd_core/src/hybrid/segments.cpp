@@ -31,7 +31,7 @@ std::optional<SegmentNumber> TriangleIndexQueue::pop_empty() {
 }
 
 std::optional<Run> TriangleIndexQueue::pop_run() {
-  // A run ends where the memory ends, and after a segment that is not filled up: its pairs end there.
+  // A run ends at the end of the memory, and after a partial segment, whose pairs end there.
   for (std::size_t i = 0; i < window_; ++i) {
     const SegmentNumber first = (window_begin_ + i) % n_;
     if (!can_be_sent(first)) continue;

@@ -16,7 +16,7 @@ using SegmentNumber = std::size_t;
 
 enum class SegmentState : unsigned char {
   empty,    // free to be given to a thread
-  partial,  // in a thread's hands
+  partial,  // held by a thread
   full,     // waits to be sent, or was sent and is not finished
 };
 
@@ -38,17 +38,18 @@ class TriangleIndexQueue {
   SegmentState state(SegmentNumber s) const { return segments_[s].state.load(std::memory_order_acquire); }
   std::size_t filled(SegmentNumber s) const { return segments_[s].filled; }
 
-  // For the thread that holds the segment: `filled` pairs are in it. Fewer than fit only where its traversal has ended.
+  // For the thread that holds the segment, with `filled` pairs in it: fewer than its capacity only if its traversal has
+  // ended.
   void set_full(SegmentNumber s, std::size_t filled);
 
-  // The rest is for the communication thread alone.
+  // The rest is for the communication thread only.
 
-  // The empty segment at the front pointer, now partial; the pointer goes on to the next empty one.
+  // The empty segment at the front pointer, now partial; the pointer advances to the next empty one.
   std::optional<SegmentNumber> pop_empty();
-  // The first run of full segments in the window that have not been sent. The window slides right after it; without a
-  // run it slides by its own length, for partial segments are looked at again when it comes back.
+  // The first run of full segments in the window that have not been sent. The window moves to the end of the run;
+  // without a run it moves by its own length, since partial segments are visited again when it comes back.
   std::optional<Run> pop_run();
-  // Finished: empty again.
+  // The run is finished: its segments are empty again.
   void release(const Run& run);
   // All empty, whatever they were.
   void clear();

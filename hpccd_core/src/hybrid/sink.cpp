@@ -14,7 +14,7 @@ std::span<const LeafPair> SegmentSink::push(LeafPair pair) {
   return make_room();
 }
 
-// False: none was handed out, or nobody takes it any more.
+// False: no segment was handed out, or the devices no longer accept pairs.
 bool SegmentSink::begin_segment() {
   if (communication_.failed()) return false;
   segment_ = supply_.receive();
@@ -26,7 +26,7 @@ bool SegmentSink::begin_segment() {
 
 std::span<const LeafPair> SegmentSink::make_room() {
   if (communication_.failed()) return give_back(0);
-  // Half of the segment stays for the devices; the thread goes on filling the other half.
+  // Half of the segment stays for the devices; the thread continues to fill the other half.
   if (communication_.devices_lag()) return give_back(n_ / 2);
   const auto other = supply_.receive();
   if (!other) {

@@ -17,11 +17,11 @@ class alignas(128) SegmentSink final : public PairSink {
   void begin() { given_back_ = without_segment_ = 0; }
   std::span<const LeafPair> push(LeafPair pair) override;
   void flush() override;
-  // Forgets its segment: the queue was cleared.
+  // Drops its segment, since the queue was cleared.
   void reset();
 
-  std::uint64_t given_back() const { return given_back_; }            // pairs, for the thread to test
-  std::uint64_t without_segment() const { return without_segment_; }  // times that no other segment was there yet
+  std::uint64_t given_back() const { return given_back_; }            // pairs that the thread must test itself
+  std::uint64_t without_segment() const { return without_segment_; }  // times that no other segment was available yet
 
  private:
   bool begin_segment();
@@ -32,10 +32,10 @@ class alignas(128) SegmentSink final : public PairSink {
   TriangleIndexQueue& queue_;
   SegmentSupply& supply_;
   const Communication& communication_;
-  std::optional<SegmentNumber> segment_;  // at work: never full
+  std::optional<SegmentNumber> segment_;  // the current segment: never full
   LeafPair* pairs_ = nullptr;
-  std::size_t n_ = 0;  // of its pairs are filled
-  LeafPair alone_{};   // without a segment: the pair last given
+  std::size_t n_ = 0;  // number of pairs in it
+  LeafPair alone_{};   // without a segment: the last pair
   std::uint64_t given_back_ = 0, without_segment_ = 0;
 };
 

@@ -24,14 +24,14 @@ struct LeafTable {
   std::uint64_t version = 0;
 };
 
-// What elements of the GPU task queue bring back.
+// The results of elements of the GPU task queue.
 struct Output {
   std::vector<Contact> vertex_face, edge_edge;
-  std::vector<Candidate> undecided;  // only exact arithmetic on the CPU decides these
+  std::vector<Candidate> undecided;  // pairs that only exact arithmetic on the CPU decides
   BatchCounts counts[2];             // vertex-face, edge-edge
 };
 
-// Index pairs that lie together in memory.
+// Index pairs that are contiguous in memory.
 struct Piece {
   const LeafPair* pairs;
   std::size_t n;
@@ -42,26 +42,26 @@ using Ticket = std::size_t;
 class TestDevice {
  public:
   virtual ~TestDevice() = default;
-  // Memory that the device reads index pairs from while other threads write elsewhere in it.
+  // Memory from which the device reads index pairs while other threads write elsewhere in it.
   virtual std::shared_ptr<LeafPair[]> pair_memory(std::size_t n) {
     return std::shared_ptr<LeafPair[]>(new LeafPair[n]);
   }
 
-  // A new frame: its positions begin to travel. The arrays stay unchanged until the frame has ended.
+  // Begins a frame and the transfer of its positions. The arrays must not change until the frame has ended.
   virtual void begin_frame(Positions t0, Positions t1) = 0;
-  // The leaves that index pairs name, before the first of them is sent.
+  // The leaves to which index pairs refer, before the first pair is sent.
   virtual void begin_traversal(const LeafTable& leaves) = 0;
-  // How many submissions the device takes at a time.
+  // The maximum number of concurrent submissions.
   virtual std::size_t slots() const = 0;
-  // Its cores, each of which can be busy with a segment.
+  // Its cores, each of which can process one segment.
   virtual std::size_t cores() const = 0;
-  // Only while fewer than slots() are under way. The pairs stay unchanged until they are collected.
+  // Only while fewer than slots() submissions are running. The pairs must not change until they are collected.
   virtual Ticket submit(const std::vector<Piece>& pieces) = 0;
-  // Whether the state variable says "data ready".
+  // Whether the state variable is "data ready".
   virtual bool ready(Ticket ticket) = 0;
-  // Appends to the output; the ticket ends.
+  // Appends to the output; the ticket becomes invalid.
   virtual void collect(Ticket ticket, Output& output) = 0;
-  // Drops whatever is under way, also after a failure. Does not throw.
+  // Drops all running work, also after a failure. Does not throw.
   virtual void cancel() = 0;
 
   virtual void count(std::map<std::string, std::uint64_t>& stats) const = 0;

@@ -15,7 +15,7 @@ struct BreadthFirstFront {
   std::vector<std::vector<NodeIndex>> high;  // the nodes above it, by depth
 };
 
-// may_split(node): whether its children are there to be taken.
+// may_split(node): whether its children may be used.
 template <class MaySplit>
 BreadthFirstFront breadth_first_front(const Hierarchy& h, std::size_t enough, MaySplit&& may_split) {
   struct Entry {

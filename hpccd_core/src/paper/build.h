@@ -7,7 +7,7 @@
 namespace hpccd::paper {
 
 // The hierarchy of the first step, split down to single triangles: on one thread until there are enough subtrees, then
-// each thread takes subtrees. (Later steps refit, and split again where section 6 asks for it: upkeep.h.)
+// each thread takes subtrees. (Later steps refit, and split again according to section 6: upkeep.h.)
 void build(Hierarchy& h, const Features& features, const std::vector<Box>& vertex_boxes, ThreadPool& pool);
 
 }  // namespace hpccd::paper

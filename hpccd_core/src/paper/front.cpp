@@ -18,7 +18,7 @@ Ancestry::Ancestry(const Hierarchy& h) : parent_(h.nodes.size()), depth_(h.nodes
 }
 namespace {
 
-// 64 KiB: enough pairs that handing a segment to a thread costs nothing, few enough to deal out evenly.
+// 64 KiB: enough pairs that distributing segments costs nothing, few enough for an even distribution.
 constexpr std::size_t longest_segment = 8192;
 
 }  // namespace
@@ -33,7 +33,7 @@ std::vector<FrontSegment> FrontUpdate::operator()(const FrontSegment& segment) {
       descend(p);
       continue;
     }
-    // All pairs below one that has come apart climb to it, one after the other.
+    // All pairs below a pair that has separated climb to it, one after the other.
     const Pair top = climb(p);
     if (top == last_climbed) continue;
     last_climbed = top;
@@ -50,11 +50,11 @@ void FrontUpdate::descend(Pair start) {
     const Pair p = stack_.back();
     stack_.pop_back();
     if (p != start) ++worker_.node_pairs;
-    if (!enabled(s_, p)) continue;  // the rules do not change: such a pair never comes back
+    if (!enabled(s_, p)) continue;  // the rules do not change: such a pair never becomes enabled
     if (!overlaps(s_, p)) {
       keep(p);
     } else if (is_leaf_pair(s_, p)) {
-      if (p.a == p.b) continue;  // nothing to find within one triangle
+      if (p.a == p.b) continue;  // there are no contacts within one triangle
       test_leaves(s_, p, worker_);
       keep(p);
     } else {

@@ -11,14 +11,14 @@
 
 namespace hpccd::paper {
 
-// Parents of nodes and of pairs of nodes, for traversals that go up again.
+// Parents of nodes and of pairs of nodes, for traversals that ascend.
 class Ancestry {
  public:
   Ancestry() = default;
   explicit Ancestry(const Hierarchy& h);  // split down to the leaves
 
-  // The pair whose refinement (visit.h) gave p, which names two different nodes. Nodes give way together, so two nodes
-  // of different depth mean that the upper one is a leaf that waited.
+  // The pair whose refinement (visit.h) produced p, which refers to two different nodes. Both nodes are split together,
+  // so if their depths differ, the upper one is a leaf that waited.
   Pair parent(Pair p) const {
     const auto a = depth_[p.a], b = depth_[p.b];
     return {a < b ? p.a : parent_[p.a], b < a ? p.b : parent_[p.b]};
@@ -30,14 +30,14 @@ class Ancestry {
   std::vector<std::uint16_t> depth_;
 };
 
-// A piece of the front, in the depth-first order of the traversal tree: what lies below one pair lies together.
+// A part of the front, in the depth-first order of the traversal tree: pairs below one pair are contiguous.
 using FrontSegment = std::vector<Pair>;
 
 struct FrontCounts {
-  std::uint64_t descended = 0, ascended = 0;  // pairs left downwards, and pairs that replaced pairs below them
+  std::uint64_t descended = 0, ascended = 0;  // pairs that were refined, and pairs that replaced pairs below them
 };
 
-// The front after this step's bounds, of one segment; what overlaps and cannot be refined is tested on the way.
+// The front after this step's bounds, for one segment; overlapping pairs that cannot be refined are tested.
 class FrontUpdate {
  public:
   FrontUpdate(const Scenery& scenery, const Ancestry& ancestry, Worker& worker, FrontCounts& counts)
@@ -58,7 +58,8 @@ class FrontUpdate {
   std::vector<FrontSegment> kept_;
 };
 
-// Joins the segments of a front in order. Where two threads replaced the halves of one run by the same pair, one stays.
+// Joins the segments of a front in order. If two threads replaced the halves of one run by the same pair, it is kept
+// once.
 std::vector<FrontSegment> joined(std::vector<std::vector<FrontSegment>>&& pieces);
 
 }  // namespace hpccd::paper

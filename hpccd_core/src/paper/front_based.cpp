@@ -42,7 +42,7 @@ class FrontBased final : public MethodEngine {
       rebuilt_ = 1;
       profiler.mark("build");
     }
-    whole_ = false;  // until this step's front is there
+    whole_ = false;  // until this step's front is complete
   }
 
   void traverse(const std::vector<Box>& vertex_boxes, Search& search, std::vector<Worker>& workers) override {
@@ -71,7 +71,7 @@ class FrontBased final : public MethodEngine {
   }
 
  private:
-  // The pair of the root with itself, taken down level by level until there is something to deal out.
+  // The pair of the root with itself, refined level by level until there are enough pairs to distribute.
   void start_front(const Scenery& scenery, Worker& worker) {
     if (h_.nodes.empty()) return;
     const std::size_t enough = 256 * static_cast<std::size_t>(context_.pool.size());

@@ -28,7 +28,8 @@ struct CenterBounds {
   }
 };
 
-// Puts the lower half along the widest axis first; ties by number, so that the result is the same everywhere.
+// Moves the lower half along the widest axis to the front; ties are broken by number, so that the result is the same on
+// every machine.
 void median(std::uint32_t* items, std::uint32_t n, std::uint32_t half, const std::vector<Box>& boxes,
             const Cancellation& cancellation) {
   CenterBounds bounds;

@@ -7,8 +7,8 @@ namespace hpccd::paper {
 
 void perform_high_level(const Scenery& s, Upkeep& upkeep, const std::vector<NodeIndex>& nodes, ThreadPool& pool,
                         std::vector<Worker>& workers, std::vector<TaskCounts>& counts) {
-  // Pairs differ in cost by orders of magnitude; with this many a thread, the sums come out even. Fewer than one pair
-  // in a thousand of a scene of interest is visited here, on one thread.
+  // Costs of pairs differ by orders of magnitude; with this many per thread, the sums are nearly equal. In relevant
+  // scenes less than one pair in a thousand is visited here, on one thread.
   constexpr std::size_t pairs_per_thread = 256;
   const auto k = static_cast<std::size_t>(pool.size());
   std::deque<Pair> queue;

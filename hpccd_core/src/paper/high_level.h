@@ -6,8 +6,9 @@
 
 namespace hpccd::paper {
 
-// The units of nodes without parent-child relationship. Their pair queue is dealt out to the threads in turn, so that
-// neighbours in the queue, which cost alike, go to different threads. Threads may meet at a node: reconstruction locks.
+// The units of nodes without parent-child relations. Their pair queue is distributed to the threads round-robin, so
+// that neighbours in the queue, which have similar costs, go to different threads. Several threads may visit the same
+// node: reconstruction takes a lock.
 void perform_high_level(const Scenery& scenery, Upkeep& upkeep, const std::vector<NodeIndex>& nodes, ThreadPool& pool,
                         std::vector<Worker>& workers, std::vector<TaskCounts>& counts);
 

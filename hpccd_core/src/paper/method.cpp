@@ -5,7 +5,7 @@ namespace hpccd::paper {
 
 std::unique_ptr<MethodEngine> engine_of(const Options& options, const Context& context) {
   if (options.method == Method::standard) return nullptr;
-  // One contact of many is a matter of order, and the order is the method's: it could not be the default's answer.
+  // Which contact is found first depends on the order of the method: it could differ from the default's result.
   if (options.report == Report::any)
     throw InvalidArgument(
         "report: 'any' is offered by method 'default' only; leave the method as it is, or report 'all' or 'first'");

@@ -16,7 +16,7 @@
 
 namespace hpccd::paper {
 
-// What lasts as long as the detector.
+// Data with the lifetime of the detector.
 struct Context {
   const Features& features;
   const PairRules& rules;
@@ -26,9 +26,9 @@ struct Context {
 class MethodEngine {
  public:
   virtual ~MethodEngine() = default;
-  // Brings the hierarchy to this step's bounds; marks what it did as "build" or "refit".
+  // Updates the hierarchy to this step's bounds; profiled as "build" or "refit".
   virtual void update(const std::vector<Box>& vertex_boxes, Profiler& profiler) = 0;
-  // Leaves what was found in the workers, one per thread of the pool.
+  // Leaves the contacts in the workers, one per thread of the pool.
   virtual void traverse(const std::vector<Box>& vertex_boxes, Search& search, std::vector<Worker>& workers) = 0;
   // Adds the counts of the last step.
   virtual void count(std::map<std::string, std::uint64_t>& stats) const = 0;

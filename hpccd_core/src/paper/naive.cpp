@@ -34,7 +34,7 @@ class Naive final : public MethodEngine {
         for (std::size_t i = thread; i < first.size(); i += static_cast<std::size_t>(k)) own.push_back(first[i]);
         perform(scenery, own, workers[thread], counts_[thread]);
       } catch (...) {
-        shared_.leave();  // nobody may wait for this thread
+        shared_.leave();  // no thread may wait for this one
         throw;
       }
       workers[thread].flush();

@@ -24,14 +24,14 @@ void primitive_pairs(const Features& features, const std::vector<Box>& vertex_bo
                      BoundedPrimitive b, TestedFeatures tested, CandidateBuffer& edge_edge,
                      CandidateBuffer& vertex_face);
 
-// Their elementary tests. Inline: it is called for each pair of leaves (out of line the traversal took 5 % longer).
+// Their elementary tests. Inline: it is called for each pair of leaves (otherwise the traversal took 5 % longer).
 inline void test_primitives(const Features& features, Rule rule, const std::vector<Box>& vertex_boxes,
                             BoundedPrimitive a, BoundedPrimitive b, Worker& worker) {
   worker.test_candidates(rule, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
     primitive_pairs(features, vertex_boxes, a, b, rule.features, edge_edge, vertex_face);
   });
 }
-// The same of two primitives by number, by the rule of their meshes.
+// The same for two primitives by number, by the rule of their meshes.
 void test_primitives(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
                      LeafPair primitives, Worker& worker);
 

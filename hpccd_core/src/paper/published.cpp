@@ -49,7 +49,7 @@ class Published final : public MethodEngine {
   std::size_t bytes() const override { return upkeep_.hierarchy().bytes(); }
 
  private:
-  // Section 4.2: one node of the front for each thread; where there are fewer, a thread starts by asking.
+  // Section 4.2: one node of the front for each thread; if there are fewer nodes, a thread starts by requesting work.
   void perform_low_level(const Scenery& scenery, const std::vector<NodeIndex>& assigned, std::vector<Worker>& workers) {
     if (assigned.empty()) return;
     scheduling_.begin();
@@ -57,7 +57,7 @@ class Published final : public MethodEngine {
       struct Leave {
         Scheduling& scheduling;
         int thread;
-        ~Leave() { scheduling.leave(thread); }  // in an exception, too, nobody may wait for this thread
+        ~Leave() { scheduling.leave(thread); }  // also after an exception, no thread may wait for this one
       } leave{scheduling_, thread};
       TaskUnits units(scenery, upkeep_, scheduling_, thread, workers[thread], counts_[thread]);
       units.perform_self_cd(static_cast<std::size_t>(thread) < assigned.size() ? assigned[thread] : no_node);

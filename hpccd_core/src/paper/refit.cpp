@@ -28,7 +28,7 @@ class Refit {
  private:
   static constexpr std::uint32_t many = 1024;  // 10 us
 
-  // A leaf, or a node that nothing has needed the children of: what lies below it is not valid.
+  // A leaf, or a node whose children nothing has needed: the nodes below it are invalid.
   void primitives(Node& node) {
     node.box = {};
     for (std::uint32_t i = node.begin; i < node.begin + node.count; ++i) {

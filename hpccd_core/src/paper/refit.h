@@ -8,7 +8,7 @@
 namespace hpccd::paper {
 
 // New bounds for the same hierarchy, bottom up: the subtrees of a front of 2k nodes for k threads, each thread taking
-// the next when it has finished one; then, on one thread, what lies above.
+// the next when it has finished one; then, on one thread, the nodes above.
 void refit(Hierarchy& h, const Features& features, const std::vector<Box>& vertex_boxes, ThreadPool& pool);
 
 // Only the boxes of all primitives.

@@ -45,7 +45,8 @@ std::uint32_t Scheduling::distribute(int thread, TaskUnitQueue& units) {
     own.n_requests = static_cast<std::uint32_t>(own.requests.size());
   }
   for (int other : served) {
-    // On the other's behalf, before it is awake: nobody may take the work for finished while nodes are on their way.
+    // On behalf of the other thread, before it is awake: the work must not count as finished while nodes are being
+    // transferred.
     ++active_;
     {
       std::lock_guard lock(slots_[other]->mutex);
@@ -63,7 +64,7 @@ bool Scheduling::request(int thread, TaskUnitQueue& units) {
     const int distributing = distribution_thread(thread);
     if (distributing < 0) {
       if (active_ == 0) return false;
-      std::this_thread::yield();  // a thread is being woken just now
+      std::this_thread::yield();  // a thread is being woken
       continue;
     }
     if (!place_request(thread, distributing)) continue;
@@ -87,7 +88,7 @@ void Scheduling::leave(int thread) {
     own.n_requests = 0;
   }
   --active_;
-  // Nobody adds to them any more: that needs an open slot. It opens again where this thread has asked.
+  // No thread adds requests any more: that would need an open slot. It opens again when this thread has requested work.
   for (int other : own.requests) wake(other, {false, 0});
   own.requests.clear();
 }

@@ -24,16 +24,17 @@ class Scheduling {
 
   void begin();  // before a traversal, on one thread: all threads have work
 
-  // The number of triangles of the node at the front of the thread's task unit queue, for others to see; 0: none.
+  // Publishes the number of triangles of the node at the front of the thread's task unit queue; 0: none.
   void show_front(int thread, std::uint32_t triangles);
-  // Whether the thread's scheduling queue holds requests: a look at its size, without a lock.
+  // Whether the thread's scheduling queue contains requests: reads its size, without a lock.
   bool requested(int thread) const;
-  // Gives the front nodes of the thread's queue to those who asked, one each, and keeps at least one node itself.
-  // Who gets none goes on waiting. Returns the number of nodes given.
+  // Gives the front nodes of the thread's queue to the requesting threads, one each, and keeps at least one node.
+  // Threads that get none continue to wait. Returns the number of nodes given.
   std::uint32_t distribute(int thread, TaskUnitQueue& units);
-  // For a thread whose queue is empty: waits for nodes; false when no thread has any left.
+  // For a thread whose queue is empty: waits for nodes; false if no thread has any left.
   bool request(int thread, TaskUnitQueue& units);
-  // For a thread that ends early: nobody waits for it any longer. Takes no memory, which may be why it ends.
+  // For a thread that ends early: no thread waits for it any longer. Allocates no memory, since the lack of it may be
+  // the reason.
   void leave(int thread);
 
  private:
@@ -44,9 +45,9 @@ class Scheduling {
   struct alignas(64) Slot {
     std::atomic<std::uint32_t> front_triangles{0};
     std::atomic<std::uint32_t> n_requests{0};
-    std::atomic<bool> open{false};  // has work, answers requests; changed under the mutex
+    std::atomic<bool> open{false};  // has work and answers requests; changed under the mutex
     std::mutex mutex;               // of the scheduling queue
-    std::vector<int> requests;      // the scheduling queue: the threads that asked, each once; has room for all
+    std::vector<int> requests;      // the scheduling queue: the requesting threads, each once; has room for all
     std::mutex message_mutex;
     std::condition_variable woken;
     std::optional<Message> message;  // to a thread that has asked one other
@@ -57,7 +58,7 @@ class Scheduling {
   void wake(int thread, Message message);
 
   std::vector<std::unique_ptr<Slot>> slots_;
-  std::atomic<int> active_{0};  // threads that have work, or to whom work is on its way
+  std::atomic<int> active_{0};  // threads that have work, or to which work is being transferred
 };
 
 }  // namespace hpccd::paper

@@ -31,11 +31,11 @@ bool SharedPairs::pop(PairQueue& own) {
   ++waiting_;
   if (waiting_ == threads_) changed_.notify_all();
   changed_.wait(lock, [&] { return !pairs_.empty() || waiting_ == threads_; });
-  if (pairs_.empty()) return false;  // stays counted as waiting: so do all others
-  // A share for every thread that waits.
+  if (pairs_.empty()) return false;  // still counted as waiting, like all others
+  // A share for every waiting thread.
   const std::size_t share =
       (pairs_.size() + static_cast<std::size_t>(waiting_) - 1) / static_cast<std::size_t>(waiting_);
-  --waiting_;  // before anything can throw: whoever leaves may not stay counted
+  --waiting_;  // before anything can throw: a thread that leaves must not be counted
   for (std::size_t i = 0; i < share; ++i) {
     own.push_back(pairs_.front());
     pairs_.pop_front();

@@ -19,13 +19,13 @@ class SharedPairs {
  public:
   void begin(int threads);
 
-  // Whether threads wait while nothing is shared: a look without a lock.
+  // Whether threads wait while nothing is shared: read without a lock.
   bool wanted() const {
     return waiting_.load(std::memory_order_relaxed) > 0 && size_.load(std::memory_order_relaxed) == 0;
   }
-  // Moves the older half of the queue here: pairs of large nodes, which cost most.
+  // Moves the older half of the queue to the shared one: pairs of large nodes, which cost most.
   void push_half(PairQueue& own);
-  // Waits for pairs; false when no thread has any left.
+  // Waits for pairs; false if no thread has any left.
   bool pop(PairQueue& own);
   // For a thread that ends early.
   void leave();

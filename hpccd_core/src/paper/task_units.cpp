@@ -21,7 +21,7 @@ void TaskUnits::perform_units() {
   }
 }
 
-// A unit is needed where the mesh may collide with itself, and two triangles at least can.
+// A unit is needed if the mesh may collide with itself and has at least two triangles.
 void TaskUnits::add_unit(NodeIndex n) {
   if (!s_.hierarchy.nodes[n].is_leaf() && enabled(s_, {n, n})) units_.push_back(n);
 }

@@ -17,7 +17,7 @@ struct TaskCounts {
   std::uint64_t units = 0, nodes_given = 0, requests = 0;
 };
 
-// What one thread does with its task unit queue and its collision test pair queue.
+// The work of one thread on its task unit queue and its collision test pair queue.
 class TaskUnits {
  public:
   TaskUnits(const Scenery& scenery, Upkeep& upkeep, Scheduling& scheduling, int thread, Worker& worker,
@@ -40,7 +40,8 @@ class TaskUnits {
   Worker& worker_;
   TaskCounts& counts_;
   TaskUnitQueue units_;
-  // Taken from the end. In the order of a queue, the breadth of the traversal would have to be kept: millions of pairs.
+  // Pairs are taken from the end. In queue order, the breadth of the traversal would have to be stored: millions of
+  // pairs.
   std::vector<Pair> pairs_;
 };
 

@@ -22,7 +22,7 @@ bool Upkeep::worn(NodeIndex n) const {
   const Node& node = h_.nodes[n];
   // The two or three triangles of a smaller node cannot be arranged much better.
   constexpr std::uint32_t smallest = 4;
-  // The surfaces' ratio lies between about 0.7 and 2. Over n-body-like-lr a step visits 1.85 million pairs of nodes
+  // The ratio of surfaces is between about 0.7 and 2. On n-body-like-lr a step visits 1.85 million pairs of nodes
   // without restructuring; 1.78, 1.37 and 1.18 million with 1.5, 1.25 and 1.1, which restructure or split 85, 2,700 and
   // 11,800 nodes.
   constexpr float worse = 1.25f;

@@ -19,9 +19,9 @@
 namespace hpccd::paper {
 
 struct UpkeepCounts {
-  std::uint64_t restructured = 0;  // nodes split anew because they culled badly
+  std::uint64_t restructured = 0;  // nodes that were split again because they culled badly
   std::uint64_t split_lazily = 0;  // nodes below those, split when needed
-  std::uint64_t lock_waits = 0;    // times a thread met a lock that another held
+  std::uint64_t lock_waits = 0;    // times that a thread found a lock taken
 };
 
 // The hierarchy of the published and of the naive method.
@@ -31,13 +31,14 @@ class Upkeep {
 
   const Hierarchy& hierarchy() const { return h_; }
 
-  // Brings the hierarchy to this step; marks "build" or "refit".
+  // Updates the hierarchy to this step; profiled as "build" or "refit".
   void begin_step(const std::vector<Box>& vertex_boxes, ThreadPool& pool, Profiler& profiler);
-  // The step came to its end. Otherwise (an exception) the next one builds anew.
+  // The step is complete. Otherwise (an exception) the next one rebuilds the hierarchy.
   void end_step() { whole_ = true; }
 
-  // Makes sure of the children of a node with several primitives. The first for a thread that has the subtree to itself
-  // (the disjoint property of section 4.1); the second for threads that may meet at the node (sections 3.2 and 4.4).
+  // Makes sure that a node with several primitives has children. The first function is for a thread that has the
+  // subtree to itself (the disjoint property of section 4.1); the second for threads that may visit the same node
+  // (sections 3.2 and 4.4).
   void examine(NodeIndex n, UpkeepCounts& counts);
   void examine_locked(NodeIndex n, UpkeepCounts& counts);
 

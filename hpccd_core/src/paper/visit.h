@@ -10,7 +10,7 @@
 
 namespace hpccd::paper {
 
-// What a traversal reads.
+// The data that a traversal reads.
 struct Scenery {
   const Hierarchy& hierarchy;
   const Features& features;
@@ -38,7 +38,7 @@ inline void test_leaves(const Scenery& s, Pair p, Worker& worker) {
   const std::uint32_t primitive_a = s.hierarchy.order[a.begin], primitive_b = s.hierarchy.order[b.begin];
   ++worker.leaf_pairs;
   if (!worker.sink)
-    // The nodes know their meshes: the primitives' would be read from a table, by no order.
+    // Nodes store their meshes: those of the primitives would be read from a table in random order.
     test_primitives(s.features, s.rules.rule(a.mesh, b.mesh), s.vertex_boxes, {primitive_a, a.box},
                     {primitive_b, b.box}, worker);
   else
@@ -46,8 +46,8 @@ inline void test_leaves(const Scenery& s, Pair p, Worker& worker) {
       test_primitives(s.features, s.rules, s.vertex_boxes, left, worker);
 }
 
-// Both nodes give way together, a leaf waits for the other. `examine(node)` comes before a node's children are named:
-// Listing 1 reconstructs before the overlap test, which needs the node's own box only, so that here pairs that do not
+// Both nodes are split together; a leaf waits for the other. `examine(node)` is called before a node's children are
+// named: Listing 1 reconstructs before the overlap test, which needs the node's own box only, so here pairs that do not
 // overlap cause no reconstruction.
 template <class Examine, class Push>
 void refine(const Hierarchy& h, Pair p, Examine&& examine, Push&& push) {

@@ -15,15 +15,15 @@ namespace hpccd::rigid {
 
 namespace {
 
-// Bounds of rounding: those of hpccd_core/rigid/rounding.py, which derives them, to the last bit.
+// Bounds on rounding errors: those of hpccd_core/rigid/rounding.py, which derives them, bit-identical.
 
 constexpr double unit = 0x1p-53;
-constexpr double tiny = 1e-150;  // lengths below it come from squares that underflow
+constexpr double tiny = 1e-150;  // shorter lengths come from squares that underflow
 
-// Not below the number that a few operations on floats meant; 0 stays 0.
+// An upper bound on the exact result of a few operations on floats; 0 stays 0.
 double up(double bound) { return bound * (1.0 + 0x1p-48); }
 
-// Not below the length; 0 of zeros.
+// An upper bound on the length; 0 for zeros.
 double length(const Vector& v) { return any(v) ? up(std::sqrt(dot(v, v))) + tiny : 0.0; }
 
 // values: sum over all joints of |q_0| + |q_1 - q_0|; reach: from the world's origin, base included.
@@ -31,14 +31,14 @@ double rounding_at_chain(double joints, double reach, double values) {
   return up(unit * reach * (128.0 * joints + 256.0 + 4.0 * values) + tiny);
 }
 
-// A joint that moves, on the way to a link. arm: from a point of its axis to the centre of the link.
+// A moving joint between the base and a link. arm: from a point of its axis to the centre of the link.
 struct Moving {
   bool turns;
   double speed;
   Vector axis, arm;
 };
 
-// Of a link, from the base on. slack: what a length computed from the poses of the middle may be off.
+// The moving joints of a link, from the base on. slack: error of a length computed from the poses at mid-step.
 struct Way {
   std::vector<Moving> moving;
   double girth, reach, slack;
@@ -59,7 +59,7 @@ std::vector<double> distances(const Way& way) {
   return found;
 }
 
-// Not below |x''| of any point of the link at t = 1/2.
+// An upper bound on |x''| of any point of the link at t = 1/2.
 double in_the_middle(const Way& way) {
   Vector of_centre{0, 0, 0}, turning{0, 0, 0}, of_turning{0, 0, 0};
   double total = 0, slides = 0;
@@ -77,16 +77,16 @@ double in_the_middle(const Way& way) {
     }
   }
   const double spin = length(of_turning) + squared(length(turning));
-  // An axis is off by the slack's part of the reach; each product of two of them by as much, times the turns.
+  // An axis has an error of slack relative to the reach; each product of two axes likewise, times the rotations.
   const double lost = way.slack * (total * total + 2 * total * slides / larger(way.reach, 1e-100));
   return up(length(of_centre) + spin * way.girth + lost);
 }
 
-// Not below max |x''| of all points of the link through the step.
+// An upper bound on max |x''| of all points of the link during the step.
 double acceleration(const Way& way) {
   if (std::ranges::none_of(way.moving, &Moving::turns)) return 0.0;
   const std::vector<double> distance = distances(way);
-  double second = 0, third = 0, s = 0;  // s: of the turns before
+  double second = 0, third = 0, s = 0;  // s: of the previous rotations
   for (std::size_t k = 0; k < distance.size(); ++k) {
     const double d = std::abs(way.moving[k].speed), g = distance[k];
     if (way.moving[k].turns) {

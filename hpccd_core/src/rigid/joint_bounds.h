@@ -12,28 +12,27 @@
 
 namespace hpccd::rigid {
 
-// What of a link's geometry its bounds need: radius: not below the farthest from the link's origin; centre, girth: a
-// ball that holds it.
+// The geometry of a link that its bounds need: radius: at least the largest distance from the link's origin; centre,
+// girth: a ball that contains it.
 struct Ball {
   double radius, girth;
   Vector centre;
 };
 
-// acceleration: not below max |x''| of all its points through the step. span: from the origin of the first joint that
-// moves to the farthest point that the link may have. rounding: how far a computed point may be from where it should
-// be.
+// acceleration: at least max |x''| of all its points during the step. span: from the origin of the first moving joint
+// to the farthest point that the link may have. rounding: bound on the error of a computed point.
 struct LinkBounds {
   double acceleration, span, rounding;
 };
 
-// Of one step: what its links share is computed once. Never changes: threads may share it.
+// The bounds of one step: data that its links share is computed once. Immutable: threads may share it.
 class JointBounds {
  public:
-  // Throws InvalidArgument where start or end is not of one value for each joint.
+  // Throws InvalidArgument unless start and end have one value for each joint.
   JointBounds(std::shared_ptr<const JointChain> chain, std::span<const double> start, std::span<const double> end,
               const Pose& base);
 
-  // Of the link of this joint. Throws InvalidArgument where there is no such joint.
+  // For the link of this joint. Throws InvalidArgument if there is no such joint.
   LinkBounds of_link(std::size_t link, const Ball& ball) const;
 
  private:
@@ -47,7 +46,7 @@ class JointBounds {
 
   std::shared_ptr<const JointChain> chain_;
   std::vector<double> start_, end_, speed_;
-  std::vector<Middle> middle_;  // of each joint in the middle of the step
+  std::vector<Middle> middle_;  // of each joint at mid-step
   double base_far_;
 };
 

@@ -11,7 +11,7 @@
 namespace hpccd::rigid {
 namespace {
 
-// From the joint's own frame at 0 to that at `value`.
+// The pose of the joint's frame at `value`, in its frame at 0.
 Pose moved(const Joint& joint, double value) {
   switch (joint.kind) {
     case JointKind::turning: {

@@ -12,8 +12,9 @@ namespace hpccd::rigid {
 
 enum class JointKind { fixed, turning, sliding };
 
-// parent: number of the joint whose link it sits on; -1: the base. origin: its frame in that of the parent's link, at
-// the value 0. axis: in its own frame, of length 1. offset: not below the length of the origin's shift.
+// parent: number of the joint of the link to which it is attached; -1: the base. origin: its frame in that of the
+// parent's link, at the value 0. axis: in its own frame, of length 1. offset: at least the length of the origin's
+// translation.
 struct Joint {
   JointKind kind;
   int parent;
@@ -22,17 +23,17 @@ struct Joint {
   double offset;
 };
 
-// In the order of their tree. Never changes: threads may share it.
+// Joints in the order of their tree. Immutable: threads may share it.
 class JointChain {
  public:
-  // Throws InvalidArgument: a parent does not come before its joint.
+  // Throws InvalidArgument if a parent does not come before its joint.
   explicit JointChain(std::vector<Joint> joints);
 
   const std::vector<Joint>& joints() const { return joints_; }
   std::size_t size() const { return joints_.size(); }
 
-  // Of the link of each joint. values: radians, or the unit of coordinates; of each joint, what fixed ones have does
-  // not matter. Throws InvalidArgument for another number of them.
+  // The pose of each joint's link. values: radians, or the unit of coordinates, for each joint; those of fixed joints
+  // are ignored. Throws InvalidArgument for another number of values.
   std::vector<Pose> poses(std::span<const double> values, const Pose& base) const;
 
  private:

@@ -9,13 +9,13 @@
 
 namespace hpccd::rigid {
 
-// One mesh: the vertices before `end` and from the end of the mesh before it on go with the link `link`.
+// One mesh: the vertices before `end`, from the end of the previous mesh on, move with the link `link`.
 struct LinkMesh {
   std::size_t link, end;
 };
 
-// Throws InvalidArgument: a mesh of a link that has no pose, ends out of order, or another number of vertices. placed:
-// as many as vertices.
+// Throws InvalidArgument if a mesh's link has no pose, if ends are out of order, or if the number of vertices differs.
+// placed: as many elements as vertices.
 void place_vertices(std::span<const Pose> poses, std::span<const LinkMesh> meshes, std::span<const Vector> vertices,
                     std::span<Vector> placed);
 

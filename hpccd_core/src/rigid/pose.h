@@ -10,7 +10,7 @@ namespace hpccd::rigid {
 
 using Vector = Vec3<double>;
 
-// A turn, of length 1.
+// A rotation, of length 1.
 struct Quaternion {
   double x = 0, y = 0, z = 0, w = 1;
 };
@@ -20,13 +20,13 @@ struct Rotation {
   Vector first, second, third;
 };
 
-// x -> turn x + shift.
+// x -> rotation x + translation.
 struct Pose {
   Quaternion turn;
   Vector shift{0, 0, 0};
 };
 
-// The turn of b, then that of a.
+// The rotation of b, followed by that of a.
 inline Quaternion product(const Quaternion& a, const Quaternion& b) {
   const Quaternion unscaled{
       a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y, a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
@@ -49,15 +49,15 @@ inline Vector rotated(const Rotation& by, const Vector& v) {
           v.x * by.third.x + v.y * by.third.y + v.z * by.third.z};
 }
 
-// `first`, then `then`.
+// `first`, followed by `then`.
 inline Pose after(const Pose& then, const Pose& first) {
   return {product(then.turn, first.turn), rotated(rotation_of(then.turn), first.shift) + then.shift};
 }
 
 inline bool any(const Vector& v) { return v.x != 0 || v.y != 0 || v.z != 0; }
 
-// What a pose does to points. Without a turn coordinates are only shifted, without a shift too they stay as they are: a
-// product with 1 and sums with 0 may change the sign of a zero.
+// Applies a pose to points. Without a rotation coordinates are only shifted, and without a translation as well they
+// stay unchanged: a product with 1 and sums with 0 could change the sign of a zero.
 class Placing {
  public:
   explicit Placing(const Pose& pose)

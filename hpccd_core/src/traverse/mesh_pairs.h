@@ -16,7 +16,7 @@ class MeshPairs {
   std::size_t size() const { return pairs_.size(); }
   // By number: (mesh_a, mesh_b) in their order, mesh_a <= mesh_b.
   const std::array<std::uint32_t, 2>& operator[](std::size_t number) const { return pairs_[number]; }
-  // Of an enabled pair, in any order.
+  // The number of an enabled pair, in any order.
   std::uint32_t number(std::uint32_t mesh_a, std::uint32_t mesh_b) const { return number_[mesh_a * n_ + mesh_b]; }
   std::size_t bytes() const { return pairs_.capacity() * sizeof(pairs_[0]) + number_.capacity() * sizeof(number_[0]); }
 

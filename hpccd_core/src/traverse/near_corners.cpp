@@ -10,7 +10,8 @@
 namespace hpccd {
 namespace {
 
-// Two leaves, by their nodes. square_of_gap(pair): of their boxes; if it overflows, any pair will do.
+// Two leaves, by their nodes. square_of_gap(pair): squared gap of their boxes; if it overflows, any pair may be
+// returned.
 template <class SquareOfGap>
 NodePair near_leaves(const Tree& tree, NodePair p, SquareOfGap&& square_of_gap) {
   constexpr AtLeaves ends;

@@ -155,7 +155,7 @@ HPCCD_HD Row min(Row a, Row b) { return {_mm256_min_ps(a.v, b.v)}; }
 HPCCD_HD Row max(Row a, Row b) { return {_mm256_max_ps(a.v, b.v)}; }
 HPCCD_HD RowMask less(Row a, Row b) { return {_mm256_cmp_ps(a.v, b.v, _CMP_LT_OQ)}; }
 HPCCD_HD RowMask operator&(RowMask a, RowMask b) { return {_mm256_and_ps(a.v, b.v)}; }
-// Lanes are not picked at once: declared only.
+// Lanes are not permuted at once: declared only.
 inline constexpr bool picks_at_once = false;
 struct Picks16 {};
 Picks16 picks(const std::uint8_t* which);

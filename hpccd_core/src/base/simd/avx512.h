@@ -143,7 +143,7 @@ HPCCD_HD bool any_in_both_halves(Mask16 a, Mask16 b) {
   return ((in_a & in_a >> 8) | (in_b & in_b >> 8)) != 0;
 }
 
-// As many floats as a register holds, and what comparing six pairs of them gives.
+// As many floats as a register holds, and the result of comparing six pairs of them.
 using Row = Floats16;
 using RowMask = Mask16;
 inline constexpr std::uint32_t row_width = 16;
@@ -193,7 +193,7 @@ HPCCD_HD Bytes16 operator&(Bytes16 a, Bytes16 b) { return {_mm_and_si128(a.v, b.
 HPCCD_HD Bytes16 operator|(Bytes16 a, Bytes16 b) { return {_mm_or_si128(a.v, b.v)}; }
 // Bit i of byte j: lane j of mask i.
 HPCCD_HD Bytes16 to_bytes(const SideBits (&of)[1]) { return {of[0].v}; }
-// Byte j: that of number which[j], out of 16 or of 32.
+// Byte j: byte number which[j], out of 16 or of 32.
 HPCCD_HD Bytes16 picked(Bytes16 bytes, Bytes16 which) { return {_mm_shuffle_epi8(bytes.v, which.v)}; }
 HPCCD_HD Bytes16 picked(Bytes16 bytes, Bytes16 next, Bytes16 which) {
   return {_mm_mask_shuffle_epi8(_mm_shuffle_epi8(bytes.v, which.v), _mm_test_epi8_mask(which.v, _mm_set1_epi8(16)),
@@ -219,7 +219,7 @@ HPCCD_HD void append_pairs(std::uint32_t* first, std::uint32_t* second, std::uin
   };
   const auto count = static_cast<unsigned>(__builtin_popcount(lanes));
   put(n, _mm512_castsi512_si256(of_lanes));
-  if (count > 8) put(n + 8, _mm512_extracti64x4_epi64(of_lanes, 1));  // seldom: three is the mean
+  if (count > 8) put(n + 8, _mm512_extracti64x4_epi64(of_lanes, 1));  // rarely: three is the mean
   n += count;
 }
 

@@ -16,7 +16,7 @@ namespace hpccd {
 typedef float Floats4 __attribute__((vector_size(16)));
 typedef std::int32_t Mask4 __attribute__((vector_size(16)));  // of a comparison: all bits of a lane, or none
 
-// From any address.
+// From any address, aligned or not.
 [[gnu::always_inline]] inline Floats4 load4(const float* x) {
   Floats4 v;
   memcpy(&v, x, sizeof v);

@@ -47,7 +47,7 @@ HPCCD_HD Lanes<T, W> select(LaneMask<T, W> m, Lanes<T, W> a, Lanes<T, W> b) {
   return Lanes<T, W>(m.v ? a.v : b.v);
 }
 
-// The same but for the sign of zero, in one operation in place of three.
+// The same except for the sign of zero, in one operation instead of three.
 template <class T, int W>
 HPCCD_HD Lanes<T, W> magnitude(Lanes<T, W> a) {
   using Bits = typename LaneMask<T, W>::Vec;
@@ -55,7 +55,7 @@ HPCCD_HD Lanes<T, W> magnitude(Lanes<T, W> a) {
   return Lanes<T, W>((typename Lanes<T, W>::Vec)((Bits)a.v & all_but_sign));
 }
 
-// bits(mask) and, where a set has it for a whole register, square_root(lanes) come with the instruction set.
+// bits(mask) and, if a set has it for a whole register, square_root(lanes) are defined by the instruction set.
 template <class T, int W>
 HPCCD_HD bool any(LaneMask<T, W> m) {
   return bits(m) != 0;

@@ -20,14 +20,14 @@ HPCCD_HD uint8x16_t low_bytes(const Mask4 (&of)[4]) {
                    high = vuzp1q_u16((uint16x8_t)of[2], (uint16x8_t)of[3]);
   return vuzp1q_u8((uint8x16_t)low, (uint8x16_t)high);
 }
-// Bit j: byte j, of which each has all bits or none.
+// Bit j: byte j, whose bits are all set or all clear.
 HPCCD_HD unsigned bits_of_bytes(uint8x16_t m) {
   const uint8x16_t own = (uint8x16_t)vdupq_n_u64(0x8040201008040201u);
   uint8x16_t sums = vandq_u8(m, own);
   for (int i = 0; i < 3; ++i) sums = vpaddq_u8(sums, sums);
   return vgetq_lane_u16((uint16x8_t)sums, 0);
 }
-// Of sixteen answers, bit j: lane j.
+// Bit j of the result: lane j of sixteen.
 HPCCD_HD unsigned bits16(const Mask4 (&of)[4]) { return bits_of_bytes(low_bytes(of)); }
 
 #include "base/simd/set_128.inl"

@@ -8,12 +8,12 @@
 
 namespace hpccd {
 
-// Sixteen numbers, where they are.
+// Sixteen numbers in memory.
 struct NumbersInMemory {
   const std::uint32_t* at;
 };
 
-// Appends the pairs of `number` with those of `others` that are in `lanes` to first[n], second[n], where there is room
+// Appends the pairs of `number` with those of `others` that are in `lanes` to first[n], second[n], which must have room
 // for sixteen.
 HPCCD_HD void append_pairs(std::uint32_t* first, std::uint32_t* second, std::uint32_t& n, std::uint32_t number,
                            const NumbersInMemory& others, unsigned lanes) {

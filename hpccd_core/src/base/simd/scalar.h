@@ -15,15 +15,15 @@
 
 namespace hpccd::scalar {
 
-// Of sixteen answers, bit j: lane j.
+// Bit j of the result: lane j of sixteen.
 HPCCD_HD unsigned bits16(const Mask4 (&of)[4]) {
   return bits4(of[0]) | bits4(of[1]) << 4 | bits4(of[2]) << 8 | bits4(of[3]) << 12;
 }
 
 #include "base/simd/set_128.inl"
 
-// Sixteen bytes. In two whole numbers: bytes are picked one by one, and a register that is read as a whole after its
-// parts were written waits for them.
+// Sixteen bytes, as two words: bytes are picked one by one, and a register that is read as a whole after its parts were
+// written stalls.
 struct Bytes16 {
   static_assert(std::endian::native == std::endian::little);  // byte j of a number is byte j in memory
   std::uint64_t half[2];
@@ -55,7 +55,7 @@ HPCCD_HD Bytes16 to_bytes(const SideBits (&of)[4]) {
 #endif
   return r;
 }
-// Byte j: that of number which[j], out of 16 or of 32.
+// Byte j: byte number which[j], out of 16 or of 32.
 HPCCD_HD Bytes16 picked_from(const std::uint8_t* of, const Bytes16& which) {
   Bytes16 r;
   for (int i = 0; i < 2; ++i) {

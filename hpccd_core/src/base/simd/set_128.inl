@@ -2,9 +2,9 @@
 // The interface of kernels (scalar.h) for 16-byte registers, as far as the compiler's own vectors implement it. Part
 // of scalar.h and neon.h, which define bits16() before it and Bytes16 after it.
 
-// Real numbers in lanes, with the operations of real.h: so many doubles, and twice as many floats. Two and four are
-// what every 64-bit processor has registers for. Where a number stands alone g++ makes branches of `select`, and what
-// comes next the processor cannot guess: the whole step of 92 K triangles took 1.5 times as long as by clang++.
+// Real numbers in lanes, with the operations of real.h: two doubles or four floats, for which every 64-bit processor
+// has registers. For scalars g++ compiles `select` to branches, which are unpredictable here: the whole step of 92 K
+// triangles took 1.5 times as long as with clang++.
 using Double = Lanes<double, 2>;
 using Single = Lanes<float, 4>;
 inline constexpr int double_width = 2;
@@ -29,7 +29,7 @@ HPCCD_HD MotionRow difference(const double* to, const double* from) {
   return {load2(to) - load2(from), load2(to + 2) - load2(from + 2), load2(to + 4) - load2(from + 4),
           load2(to + 6) - load2(from + 6)};
 }
-// As many rows as Double has lanes, a row a lane.
+// As many rows as Double has lanes, one row per lane.
 struct MotionLanes {
   Vec3<Double> t0, t1;
 };
@@ -39,7 +39,7 @@ HPCCD_HD MotionLanes transposed(const MotionRow r[double_width]) {
   return {transposed(xy_t0, z_t0), transposed(xy_t1, z_t1)};
 }
 
-// The same of a snapshot: x y z and padding, of as many points as Double has lanes.
+// The same for a snapshot: x y z and padding, of as many points as Double has lanes.
 struct PointRows {
   Double xy[double_width], z[double_width];
 };
@@ -117,7 +117,7 @@ HPCCD_HD Floats16 max(const Floats16& a, const Floats16& b) {
   return r;
 }
 
-// Sixteen answers.
+// Sixteen results.
 struct Mask16 {
   Mask4 part[4] = {};
   // Bit j: lane j.
@@ -138,13 +138,13 @@ HPCCD_HD Mask16 less(const Floats16& a, const Floats16& b) {
   for (int i = 0; i < 4; ++i) r.part[i] = a.part[i] < b.part[i];
   return r;
 }
-// Whether for some j < 8 lanes j and j + 8 of a, or of b, both say yes.
+// Whether for some j < 8 lanes j and j + 8 of a, or of b, are both true.
 HPCCD_HD bool any_in_both_halves(const Mask16& a, const Mask16& b) {
   const Mask4 low = (a.part[0] & a.part[2]) | (b.part[0] & b.part[2]);
   return any4(low | (a.part[1] & a.part[3]) | (b.part[1] & b.part[3]));
 }
 
-// As many floats as a register holds, and what comparing six pairs of them gives.
+// As many floats as a register holds, and the result of comparing six pairs of them.
 struct Row {
   Floats4 v;
 };
@@ -162,7 +162,7 @@ HPCCD_HD Row min(Row a, Row b) { return {min4(a.v, b.v)}; }
 HPCCD_HD Row max(Row a, Row b) { return {max4(a.v, b.v)}; }
 HPCCD_HD RowMask less(Row a, Row b) { return {a.v < b.v}; }
 HPCCD_HD RowMask operator&(RowMask a, RowMask b) { return {a.v & b.v}; }
-// Lanes are not picked at once: declared only.
+// Lanes are not permuted at once: declared only.
 inline constexpr bool picks_at_once = false;
 struct Picks16 {};
 Picks16 picks(const std::uint8_t* which);
@@ -178,7 +178,7 @@ HPCCD_HD SideBits side_bits(const RowMask* m) {
   return {all};
 }
 
-// Rows of sixteen floats that are used again and again: in registers where these are as long as a row.
+// Rows of sixteen floats that are used repeatedly: in registers if these are as long as a row.
 template <std::uint32_t n>
 struct Rows16 {
   const float (*rows)[16];

@@ -14,12 +14,12 @@ namespace hpccd::exact {
 
 namespace detail {
 
-// The sign of f beside m / 2^k, where its lowest derivative that does not vanish decides; direction is 1 or -1. Before
-// t = 0 and after t = 1 the motion goes on in its straight lines.
+// The sign of f next to m / 2^k, by its lowest derivative that does not vanish; direction is 1 or -1. Before t = 0 and
+// after t = 1 the motion continues on its straight lines.
 template <class Z, class M>
 HPCCD_HOST_DEVICE_CALL int sign_beside(const Polynomial<Z, 3>& f, const M& m, int k, int direction) {
   if (const int s = sign_at_dyadic(f, m, k)) return s;
-  using W = Plus<Z, 1>;  // three times a coefficient may need a bit more than it
+  using W = Plus<Z, 1>;  // three times a coefficient may need one more bit
   const W c1(f.c[1]), c2(f.c[2]), c3(f.c[3]);
   const Polynomial<W, 2> slope{{c1, c2 + c2, c3 + c3 + c3}};
   if (const int s = sign_at_dyadic(slope, m, k)) return direction * s;
@@ -30,12 +30,12 @@ HPCCD_HOST_DEVICE_CALL int sign_beside(const Polynomial<Z, 3>& f, const M& m, in
 
 template <class Z, int D>
 HPCCD_HOST_DEVICE int sign_before(const Polynomial<Z, 3>& f, const Root<Z, D>& root) {
-  // The interval of a root that is not exact holds no other.
+  // The interval of an inexact root contains no other root.
   return root.exact ? sign_beside(f, root.m, root.k, -1) : sign_beside(f, root.m, root.k, 1);
 }
 
-// n_k as floating-point numbers with one common scale; `low` is the power of two of each axis. sign_of(k) is the sign
-// of n_k.
+// n_k as floating-point numbers with one common scale; `low` is the power of two of each axis. sign_of(k) returns the
+// sign of n_k.
 template <class Z, class M, class Sign>
 HPCCD_HOST_DEVICE Vec3<double> direction(const Query<Z>& q, const int low[3], const M& m, int k, Sign&& sign_of) {
   double fraction[3] = {};
@@ -53,8 +53,8 @@ HPCCD_HOST_DEVICE Vec3<double> direction(const Query<Z>& q, const int low[3], co
   return {scaled(0), scaled(1), scaled(2)};
 }
 
-// Which of the roots of f, whose times are given, the contact at `toc` is: of those within `same_time` the first at
-// which the features touch; else the nearest, where the features are known to touch. -1: none.
+// Which of the roots of f, given by their times, belongs to the contact at `toc`: among those within `same_time` the
+// first at which the features touch; otherwise the nearest one, if the features are known to touch. -1: none.
 template <class Touches>
 HPCCD_HOST_DEVICE int root_of_contact(const std::int64_t* times, int n, std::int64_t toc, Touches&& touches_at) {
   // More than twice the radius of a proven time of contact (Proven::toc_radius), by which the conservative tier reports
@@ -69,7 +69,7 @@ HPCCD_HOST_DEVICE int root_of_contact(const std::int64_t* times, int n, std::int
   return nearest;
 }
 
-// Where no root of f belongs to the contact: features that are apart.
+// For features that are apart: no root of f belongs to a contact.
 template <class Z>
 HPCCD_HOST_DEVICE Approach approach_between_roots(const Query<Z>& q, const int low[3], std::int64_t toc) {
   const Time<Z> m(toc);
@@ -83,7 +83,7 @@ HPCCD_HOST_DEVICE inline std::int64_t time_of(double toc) {
   return static_cast<std::int64_t>(std::ldexp(toc, time_bits));
 }
 
-// Nothing where it stays open with integers of this size.
+// Nothing if integers of this size leave it undecided.
 template <class Z>
 HPCCD_HOST_DEVICE_CALL std::optional<Approach> approach(const Query<Z>& q, const int low[3], double toc) {
   const int degree = q.f.degree();

@@ -14,7 +14,7 @@ using Big = boost::multiprecision::number<boost::multiprecision::cpp_int_backend
 
 inline int sign(const Big& x) { return x.sign(); }
 
-// Of a number that is not zero.
+// For a number that is not zero.
 inline int highest_bit(const Big& x) {
   const auto& limbs = x.backend();
   const int top = static_cast<int>(limbs.size()) - 1;

@@ -11,8 +11,8 @@ namespace hpccd::exact {
 
 HPCCD_HOST_DEVICE inline double coordinate(const Vec3<double>& v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
 
-// Whether they are farther apart than d along some axis. A difference of doubles, rounded, is above d only where the
-// true one is.
+// Whether they are farther apart than d along some axis. A rounded difference of doubles exceeds d only if the exact
+// one does.
 HPCCD_HOST_DEVICE inline bool boxes_apart(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double d) {
   const int split = kind == Kind::vertex_face ? 1 : 2;
   for (int k = 0; k < 3; ++k) {

@@ -16,7 +16,7 @@ Resting<Z> resting(Kind kind, const Given& given, int low) {
   return r;
 }
 
-// Calls f with the features in the smallest integers that hold them.
+// Calls f with the features in the smallest sufficient integers.
 template <class F>
 auto in_integers(Kind kind, const Vec3<double> q[4], F&& f) {
   const Given given(q);
@@ -78,7 +78,7 @@ Nearest points_at(Kind kind, const Vec3<double> q[4], const Place& place) {
   return {0, foot, q[point]};
 }
 
-// Of parallel edges that are side by side: the places on both in the middle of the common stretch.
+// For parallel edges side by side: positions on both in the middle of the common stretch.
 template <class Z>
 bool middle_of_common_stretch(const Resting<Z>& edges, bool parallel, double& on_a, double& on_b) {
   const auto [p, a, b] = edges.spanned();

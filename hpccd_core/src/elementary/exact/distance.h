@@ -10,7 +10,7 @@ namespace hpccd::exact {
 // Whether the distance is at most d >= 0, for finite q[0..3] (v f0 f1 f2 or a0 a1 b0 b1) and d.
 bool within(Kind kind, const Vec3<double> q[4], double d);
 
-// The true distance, off by one unit in the last place at most; 0 only where the features touch.
+// The exact distance with an error of at most one unit in the last place; 0 only if the features touch.
 double distance(Kind kind, const Vec3<double> q[4]);
 
 struct Nearest {
@@ -18,8 +18,8 @@ struct Nearest {
   Vec3<double> on_first, on_second;
 };
 
-// Of parallel edges side by side: the middle of the stretch that they share. Each coordinate of the points is off by a
-// few roundings of the vertices' coordinates. parallel: the edges are known to be parallel, whatever rounding did to q.
+// For parallel edges side by side: the middle of the common stretch. Coordinates of the points have errors of a few
+// roundings of the vertices' coordinates. parallel: the edges are known to be parallel, whatever the rounding of q.
 Nearest nearest(Kind kind, const Vec3<double> q[4], bool parallel = false);
 
 }  // namespace hpccd::exact

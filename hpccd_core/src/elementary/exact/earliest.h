@@ -11,7 +11,7 @@
 namespace hpccd::exact {
 
 struct Answer {
-  bool decided;  // false: with integers of this size it stays open
+  bool decided;  // false: undecided with integers of this size
   std::optional<double> toc;
 };
 
@@ -27,7 +27,7 @@ HPCCD_HOST_DEVICE bool touches_at_start(const Query<Z>& q) {
   return sign(q.f.c[0]) == 0 && touches(q, [](const auto& p) { return sign(p.c[0]); });
 }
 
-// The first of the roots at which the features touch.
+// The first root at which the features touch.
 template <class Z, class R>
 HPCCD_HOST_DEVICE Answer first_touching(const Query<Z>& q, R* roots, int n) {
   for (int i = 0; i < n; ++i) {
@@ -41,10 +41,10 @@ HPCCD_HOST_DEVICE Answer first_touching(const Query<Z>& q, R* roots, int n) {
   return {true, {}};
 }
 
-// Roots of several polynomials, by time. Those in the wrong order have the same time.
+// Roots of several polynomials, sorted by time. Roots in the wrong order have the same rounded time.
 template <class Z>
 struct Events {
-  static constexpr int most = 10;  // two of each of the polynomials: of n_k, and of four conditions at most
+  static constexpr int most = 10;  // two of each polynomial: of n_k, and of at most four conditions
   std::array<Root<Z, 2>, most> root;
   int n = 0;
 

@@ -7,7 +7,7 @@
 
 namespace hpccd::exact {
 
-// Nothing where integers of any size must tell.
+// Nothing if integers of any size are needed.
 HPCCD_HOST_DEVICE inline std::optional<Approach> fixed_approach(Kind kind, const GivenMotion& given, double toc) {
   if (given.bits <= Widths<Integer<1>>::coordinate_bits) return approach(given.query<Integer<1>>(kind), given.low, toc);
   if (given.bits <= Widths<Integer<2>>::coordinate_bits) return approach(given.query<Integer<2>>(kind), given.low, toc);

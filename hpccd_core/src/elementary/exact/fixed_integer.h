@@ -35,7 +35,7 @@ struct Integer {
     for (std::uint64_t& limb : limbs) limb = x;
   }
   HPCCD_HOST_DEVICE bool negative() const { return static_cast<std::int64_t>(limbs[N - 1]) < 0; }
-  // What all limbs further up would be.
+  // The value of all further limbs (sign extension).
   HPCCD_HOST_DEVICE std::uint64_t extension() const { return negative() ? ~std::uint64_t{0} : 0; }
 };
 
@@ -63,7 +63,7 @@ HPCCD_HOST_DEVICE Integer<N> sum(const Integer<N>& a, const Integer<N>& b) {
   return s;
 }
 
-// high -= x where the flag is set: turns an unsigned product into a signed one.
+// Subtracts x from `high` if the flag is set: turns an unsigned product into a signed one.
 template <int N, int M>
 HPCCD_HOST_DEVICE void subtract_high(Integer<N>& from, const Integer<M>& x, std::uint64_t mask) {
   std::uint64_t borrow = 0;
@@ -118,7 +118,7 @@ HPCCD_HOST_DEVICE_CALL Integer<A + B> operator*(const Integer<A>& a, const Integ
   return product;
 }
 
-// x * 2^bits in `More` limbs more than x has.
+// x * 2^bits with `More` limbs more than x.
 template <int More, int N>
 HPCCD_HOST_DEVICE_CALL Integer<N + More> shifted(const Integer<N>& x, int bits) {
   Integer<N + More> y;
@@ -132,7 +132,7 @@ HPCCD_HOST_DEVICE_CALL Integer<N + More> shifted(const Integer<N>& x, int bits) 
   return y;
 }
 
-// x * m, which must fit its type, by its lowest limbs alone.
+// x * m, which must fit the type, by the lowest limbs only.
 template <int N>
 HPCCD_HOST_DEVICE Integer<N> scaled(const Integer<N>& x, std::uint64_t m) {
   Integer<N> y;
@@ -145,7 +145,7 @@ HPCCD_HOST_DEVICE Integer<N> scaled(const Integer<N>& x, std::uint64_t m) {
   return y;
 }
 
-// About |x|, as a fraction in [0.5, 1) or 0 times a power of two.
+// An approximation of |x|: a fraction in [0.5, 1), or 0, times a power of two.
 template <int N>
 HPCCD_HOST_DEVICE_CALL double magnitude_of(const Integer<N>& x, int& exponent) {
   const Integer<N> y = x.negative() ? -x : x;

@@ -10,7 +10,7 @@ namespace {
 
 using V = Vec3<double>;
 
-// Squares may overflow and underflow, but lengths do not.
+// The squares may overflow and underflow, the lengths do not.
 struct Length {
   V unit;
   double length;
@@ -57,16 +57,16 @@ struct BinaryTime {
   }
 };
 
-// The gap at one time, between the parts of the features that are nearest then: point and face, two lines, point and
-// line, or two points. While the nearest places stay inside these parts, it changes only by `velocity` and by the
-// rotation of the parts. Times are fractions of the step.
+// The gap at one time, between the nearest parts of the features: point and face, two lines, point and line, or two
+// points. While the nearest points stay inside these parts, the gap changes only by `velocity` and by the rotation of
+// the parts. Times are fractions of the step.
 struct Gap {
   double length;
   V direction;
   Length velocity;
-  bool stands_on_normal = false;  // it is along the normal of a face or of two lines, and rotates with them
+  bool stands_on_normal = false;  // the gap is along the normal of a face or of two lines, and rotates with them
   double turning = 0;             // bound on the rotation of the parts, in radians
-  double sliding = 0, room = 0;   // bound on the motion of the places, and to the next border, in lengths of the parts
+  double sliding = 0, room = 0;   // bound on the motion of the nearest points, relative to the parts and their borders
   double sum_of_steps = 0;        // sum of the lengths of the motions, of which the velocity is a difference
 };
 
@@ -109,7 +109,7 @@ class Moving {
     const Length a_ = length_of(a, unit), b_ = length_of(b, unit), n_ = length_of(n, 0);
     const double sine = max_norm(cross(a_.unit, b_.unit)) > 1e-8
                             ? Length(cross(a_.unit, b_.unit)).length
-                            : ratio(dot(n, n), dot(a, a) * dot(b, b));  // its square: small enough either way
+                            : ratio(dot(n, n), dot(a, a) * dot(b, b));  // its square: small enough in either case
     const Length da_ = length_of(da, low_), db_ = length_of(db, low_);
     const V drift = vector_of(dp, low_) - place.alpha * (da_.length * da_.unit) - place.beta * (db_.length * db_.unit);
     Gap gap{0, static_cast<double>(sign(dot(p, n))) * n_.unit, Length({0, 0, 0})};
@@ -180,12 +180,12 @@ Vec3<double> direction_of_gap(Kind kind, const V q_t0[4], const V q_t1[4], doubl
     direction = gap.direction;
     if (!(gap.length > d) || !(gap.velocity.length > 0)) break;
     const double rest = time_until(gap, d), turning = rest * gap.turning;
-    // The remaining motion changes the direction by no more than this: if the gap is along a normal, by the rotation of
-    // the parts; otherwise by the motion of its ends relative to its length.
+    // The remaining motion changes the direction by at most this: by the rotation of the parts if the gap is along a
+    // normal; otherwise by the motion of its ends relative to its length.
     constexpr double enough = 1e-9;
     const bool stays = gap.stands_on_normal && 2 * rest * gap.sliding < gap.room;
     if (turning < enough && (stays || gap.sum_of_steps * rest < enough * gap.length)) break;
-    // Never beyond the time sought: after it the gap may open to the other side.
+    // Never beyond the time: after it the gap may open to the other side.
     const double error = 0x1p-40 + 2 * turning + 0x1p-48 * gap.sum_of_steps / gap.velocity.length;
     t.advance(rest * (error < 0.5 ? 1 - error : 0.5));
   }
@@ -193,7 +193,7 @@ Vec3<double> direction_of_gap(Kind kind, const V q_t0[4], const V q_t1[4], doubl
 }
 
 bool stay_parallel(const V q_t0[4], const V q_t1[4]) {
-  // Roundings of the edges' directions and of their product are below 16 units in its last place.
+  // Rounding errors of the edges' directions and of their product are below 16 units in its last place.
   for (const V* q : {q_t0, q_t1})
     if (max_norm(cross(Length(q[1] - q[0]).unit, Length(q[3] - q[2]).unit)) > 1e-14) return false;
   const auto never_spanned = [](const auto& query) {

@@ -6,18 +6,18 @@
 
 #include "base/bits.h"
 #include "elementary/exact/fixed_integer.h"
-#if !defined(__CUDACC__)  // no integers of any size on GPUs
+#if !defined(__CUDACC__)  // GPUs have no integers of any size
 #include "elementary/exact/big_integers.h"
 #endif
 
 namespace hpccd::exact {
 
-// What a template needs to know of the integer type of its coordinates.
+// The properties of the integer type of coordinates.
 template <class Z>
 struct Widths;
 template <int N>
 struct Widths<Integer<N>> {
-  // A quadratic's coefficients have at most 2 b + 7 bits, a cubic's 3 b + 10 (query.h); all that is computed from them
+  // A quadratic's coefficients have at most 2 b + 7 bits, a cubic's 3 b + 10 (query.h); everything computed from them
   // fits its type if b is at most this.
   static constexpr int coordinate_bits = 64 * N - 4;
   static constexpr bool any_size = false;
@@ -35,7 +35,7 @@ struct Widths<Big> {
 };
 #endif
 template <class Z, int More>
-using Plus = typename Widths<Z>::template Plus<More>;  // with room for `More` limbs more
+using Plus = typename Widths<Z>::template Plus<More>;  // with `More` additional limbs
 template <class Z>
 using Time = typename Widths<Z>::Time;  // of a numerator of a dyadic time
 
@@ -57,7 +57,7 @@ struct OddMantissa {
   }
 };
 
-// The exponents of the lowest and the highest bit in use among doubles (zeros apart).
+// The exponents of the lowest and the highest bit in use among doubles (except zeros).
 struct BitRange {
   int low = 4096, high = -4096;
   HPCCD_HOST_DEVICE void include(const OddMantissa& x) {

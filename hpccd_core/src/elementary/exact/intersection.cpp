@@ -8,7 +8,7 @@
 namespace hpccd::exact {
 namespace {
 
-// A coordinate that is not zero, or none: 3.
+// The index of a coordinate that is not zero, or 3.
 template <class Z>
 int nonzero(const Vector<Z>& v) {
   int k = 0;
@@ -20,16 +20,16 @@ bool parallel(const Vector<Z>& a, const Vector<Z>& b) {
   return nonzero(cross(a, b)) == 3;
 }
 
-// On a line: the order along it.
+// For points on a line: the order along it.
 bool before(const Vec3<double>& a, const Vec3<double>& b) {
   return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
 }
 
-// The five points as integers. Each axis may have a scale of its own: no sign below notices, nor does the order on a
-// line.
+// The five points as integers. Each axis may have its own scale, which affects neither the signs below nor the order on
+// a line.
 //
 // Bits, for coordinates of b bits: a difference has b + 1, a component of a cross product 2 b + 3, a volume 3 b + 6, a
-// difference of volumes one more. All fit their types where b is at most Widths::coordinate_bits.
+// difference of volumes one more. All fit their types if b is at most Widths::coordinate_bits.
 template <class Z>
 class Points {
  public:
@@ -55,9 +55,8 @@ class Points {
   }
 
  private:
-  // Both in one plane, seen along an axis k along which the face is not seen from its edge: they are apart where one of
-  // the four lines of their sides has the other figure beyond it. An edge that is a point has no such line, and its
-  // signs are 0.
+  // Both in one plane, projected along an axis k along which the face has an area: they are apart if one of the four
+  // lines of their sides has the other figure beyond it. An edge that is a point has no such line, and its signs are 0.
   static bool meets_in_plane(const Vector<Z>& a, const Vector<Z>& b, const Vector<Z>& p, const Vector<Z>& r, int k) {
     const auto n = cross(a, b, k), m = cross(p, r, k);
     const auto alpha_p = cross(p, b, k), alpha_r = cross(r, b, k), beta_p = cross(a, p, k), beta_r = cross(a, r, k);

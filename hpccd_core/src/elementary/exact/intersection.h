@@ -6,8 +6,8 @@
 
 namespace hpccd::exact {
 
-// The edge q[0] q[1] and the face q[2] q[3] q[4], all finite: whether the closed sets share a point. Degenerate ones
-// are the segments and points that they are.
+// Whether the edge q[0] q[1] and the face q[2] q[3] q[4], all finite, have a common point, as closed sets. Degenerate
+// ones are treated as the segments and points that they are.
 bool intersect(const Vec3<double> q[5]);
 
 }  // namespace hpccd::exact

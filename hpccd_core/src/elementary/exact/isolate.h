@@ -29,10 +29,10 @@ struct Bernstein {
 };
 
 inline constexpr int isolation_limbs = 2;
-// 40 halvings cost 120 bits and separate roots 1e-12 apart; what is still together probably coincides.
+// 40 halvings cost 120 bits and separate roots at a distance of 1e-12; roots that are still together probably coincide.
 inline constexpr int isolation_depth = 40;
 
-// Of the polynomial of this degree with coefficients c, times the least number that keeps all integers.
+// For the polynomial of this degree with coefficients c, times the smallest number that keeps all integers.
 template <class W>
 HPCCD_HOST_DEVICE Bernstein<W> bernstein_of(const std::array<W, 4>& c, int degree) {
   const W &c0 = c[0], &c1 = c[1], &c2 = c[2];
@@ -55,7 +55,7 @@ HPCCD_HOST_DEVICE auto to_bernstein(const Polynomial<Z, D>& p, int degree) {
   return bernstein_of(c, degree);
 }
 
-// Of [m, m+1] / 2^k. Each halving scales by 2^degree, which no sign notices.
+// On [m, m+1] / 2^k. Each halving scales by 2^degree, which does not affect signs.
 template <class Z, int D>
 HPCCD_HOST_DEVICE_CALL auto to_bernstein(const Polynomial<Z, D>& p, int degree, std::int64_t m, int k) {
   using W = Plus<Z, isolation_limbs>;
@@ -87,7 +87,7 @@ template <class Z, int D>
 struct Roots {
   std::array<Root<Z, D>, D> root;
   int n = 0;
-  bool complete = true;  // false: some were too close to tell apart with integers of this size
+  bool complete = true;  // false: some roots were too close to be separated with integers of this size
 
   // p must not be constant.
   HPCCD_HOST_DEVICE explicit Roots(const Polynomial<Z, D>& p) {
@@ -114,8 +114,8 @@ struct Roots {
     root[n++] = {p, Time<Z>(m), k, exact, before, degree == 1};
   }
 
-  // Those strictly inside, part after part; without recursion, for which a GPU has no stack. False where a part still
-  // shows several roots after all halvings.
+  // Roots strictly inside, part after part; without recursion, for which a GPU has no stack. False if a part still has
+  // several roots after all halvings.
   template <class W>
   HPCCD_HOST_DEVICE_CALL bool isolate(const Polynomial<Z, D>& p, detail::Bernstein<W> b) {
     const int degree = b.n;

@@ -21,7 +21,7 @@ inline double root_of_ratio(const Big& num, const Big& den, int low) {
   return root > 0 ? root : std::numeric_limits<double>::denorm_min();
 }
 
-// x / y, rounded about twice; y > 0.
+// x / y, with about two rounding errors; y > 0.
 template <class X, class Y>
 double ratio(const X& x, const Y& y) {
   int ex, ey;
@@ -29,7 +29,7 @@ double ratio(const X& x, const Y& y) {
   return sign(x) * std::ldexp(fraction, std::max(ex - ey, -2000));
 }
 
-// p = alpha a + beta b (motion.h) for nearest points inside; otherwise a point and a place on a segment.
+// p = alpha a + beta b (motion.h) for nearest points inside; otherwise a point and a position on a segment.
 struct Place {
   enum { inside, on_segment, at_end } where = at_end;
   double alpha = 0, beta = 0;

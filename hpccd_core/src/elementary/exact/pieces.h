@@ -15,8 +15,8 @@ namespace hpccd::exact {
 template <class Distance, class Condition, int n>
 struct Piece {
   Distance distance;                       // vanishes where they are d apart
-  Condition not_zero;                      // nowhere negative; without it there is no plane or line
-  std::array<Condition, n> at_least_zero;  // the nearest points lie inside
+  Condition not_zero;                      // never negative; zero where there is no plane or line
+  std::array<Condition, n> at_least_zero;  // positive where the nearest points are inside
   int n_at_least_zero = n;
 };
 
@@ -28,12 +28,12 @@ class Pieces {
 
   Pieces(const Query<Z>& q, const Margin& d) : q_(q), d_(d), d2_(Z(d.mantissa) * Z(d.mantissa)) {}
 
-  // The cheapest first: what comes later need not be looked at beyond their times.
+  // The cheapest pieces first: later ones are only searched before the times that these find.
   template <class Visit>
   void visit_all(Visit&& visit) const {
     for (int i = 0; i < q_.n_degenerate(); ++i) {
       const auto [from_start, from_end] = q_.degenerate(i);
-      // Each pair of points once.
+      // Each pair of points occurs once.
       if (q_.kind == Kind::edge_edge ? i < 2 : i == 0) points(from_start, visit);
       if (i < 2) points(from_end, visit);
     }

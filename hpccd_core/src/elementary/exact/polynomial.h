@@ -9,9 +9,9 @@ namespace hpccd::exact {
 // Of degree at most D.
 template <class Z, int D>
 struct Polynomial {
-  std::array<Z, D + 1> c;  // c[i] belongs to t^i
+  std::array<Z, D + 1> c;  // coefficient of t^i
 
-  // -1: zero throughout.
+  // -1 for the zero polynomial.
   HPCCD_HOST_DEVICE int degree() const {
     int d = D;
     while (d >= 0 && sign(c[d]) == 0) --d;
@@ -84,26 +84,26 @@ HPCCD_HOST_DEVICE_CALL int sign_at_ratio(const Polynomial<Z, D>& p, const Q& num
     return sign(p.c[0] * (den * den2) + p.c[1] * (num * den2) + p.c[2] * (num2 * den) + p.c[3] * (num2 * num));
 }
 
-// The sign that p certainly has on the whole of [m, m+1] / 2^k by its Bernstein coefficients there; 0: not certain.
+// The sign that p certainly has on all of [m, m+1] / 2^k, by its Bernstein coefficients there; 0: not certain.
 template <class Z, class M>
 HPCCD_HOST_DEVICE_CALL int sign_on_dyadic(const Polynomial<Z, 2>& p, const M& m, int k) {
   const auto left = value_at(p, m, k);
   const int s = sign(left);
   if (s == 0) return 0;
-  // Half of it is what the middle coefficient lies above the left one.
+  // Half of this is the difference of the middle and the left coefficient.
   const auto rise = shifted<1>(p.c[1], k) + shifted<0>(p.c[2] * m, 1);
   if (sign(shifted<0>(left, 1) + rise) != s) return 0;
   return sign(left + rise + p.c[2]) == s ? s : 0;
 }
 
-// Coefficients of degree n become those of Bernstein times the binomial ones.
+// Converts coefficients of degree n to Bernstein coefficients times binomial coefficients.
 template <class Number>
 HPCCD_HOST_DEVICE void to_bernstein(Number* a, int n) {
   for (int i = 0; i < n; ++i)
     for (int j = 1; j <= n - i; ++j) a[j] += a[j - 1];
 }
 
-// The remainder of q2^2 f by q, whose leading coefficient is not zero.
+// The remainder of q2^2 f divided by q, whose leading coefficient is not zero.
 template <class X, class Y>
 HPCCD_HOST_DEVICE auto pseudo_remainder(const Polynomial<X, 3>& f, const Polynomial<Y, 2>& q) {
   const auto g0 = q.c[2] * f.c[0], g1 = q.c[2] * f.c[1] - f.c[3] * q.c[0], g2 = q.c[2] * f.c[2] - f.c[3] * q.c[1];

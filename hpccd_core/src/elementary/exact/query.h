@@ -14,9 +14,9 @@
 namespace hpccd::exact {
 
 template <class Z>
-using Coordinates = Vector<Polynomial<Z, 1>>;  // a vector that moves: one polynomial a coordinate
+using Coordinates = Vector<Polynomial<Z, 1>>;  // a moving vector: one polynomial per coordinate
 
-// Each axis of the points may have a scale of its own: no sign below notices.
+// Each axis of the points may have its own scale, which does not affect the signs below.
 template <class Z>
 struct Query {
   using Square = decltype(Z() * Z());
@@ -28,7 +28,7 @@ struct Query {
   std::array<Quadratic, 3> n;
   Cubic f;
 
-  // Of p x b and a x p. Large numbers are not multiplied twice.
+  // Coordinates of p x b and a x p. Products of large numbers are computed once.
   HPCCD_HOST_DEVICE decltype(auto) pb(int k) const { return product<0>(p, b, k); }
   HPCCD_HOST_DEVICE decltype(auto) ap(int k) const { return product<3>(a, p, k); }
 
@@ -41,8 +41,7 @@ struct Query {
     f = dot(p, n);
   }
 
-  // The features touch where all conditions of a coordinate k, times the sign of n_k, are at least 0: alpha n and so
-  // on.
+  // The features touch if all conditions of a coordinate k, times the sign of n_k, are at least 0: alpha n and so on.
   template <class Visit>
   HPCCD_HOST_DEVICE void conditions(int k, Visit&& visit) const {
     const Quadratic &pb_k = pb(k), &ap_k = ap(k);
@@ -52,8 +51,8 @@ struct Query {
       (void)(visit(pb_k) && visit(n[k] - pb_k) && visit(-ap_k) && visit(n[k] + ap_k));
   }
 
-  // Where n vanishes the triangle is the union of its edges, and two segments are parallel or points: they touch where
-  // a point lies on a segment. The vectors from a segment's ends to the point.
+  // If n vanishes, the triangle is the union of its edges, and two segments are parallel or points: they touch if a
+  // point lies on a segment. The vectors from a segment's ends to the point.
   struct PointOnSegment {
     Coordinates<Z> from_start, from_end;
   };
@@ -64,7 +63,7 @@ struct Query {
       if (i == 1) return {p, p - a};
       return {p - a, p - b};
     }
-    if (i == 0) return {p, p + b};          // a0 on b, both vectors turned round
+    if (i == 0) return {p, p + b};          // a0 on b, both vectors reversed
     if (i == 1) return {a - p, a - p - b};  // a1 on b
     return i == 2 ? PointOnSegment{p, p - a} : PointOnSegment{p + b, p + b - a};
   }
@@ -97,7 +96,7 @@ struct Query {
   }
 };
 
-// sign_of(q) tells the sign of a polynomial at the time in question.
+// sign_of(q) returns the sign of a polynomial at the given time.
 template <class Z, class Sign>
 HPCCD_HOST_DEVICE bool touches(const Query<Z>& q, Sign&& sign_of) {
   for (int k = 0; k < 3; ++k) {
@@ -118,9 +117,10 @@ HPCCD_HOST_DEVICE bool touches(const Query<Z>& q, Sign&& sign_of) {
   return false;
 }
 
-// Coplanar throughout: the earliest time at which they touch is 0 or a root of one of these polynomials. Where one
-// coordinate of n does not vanish throughout, its conditions alone decide between its roots, and the set of times at
-// which they touch is closed. Where n does, each point is on its line at roots of one polynomial only, or always.
+// Motion that is coplanar throughout: the earliest time at which the features touch is 0 or a root of one of these
+// polynomials. If a coordinate of n does not vanish throughout, its conditions decide between its roots, and the set of
+// times at which they touch is closed. If n vanishes throughout, each point is on its line at roots of one polynomial
+// only, or always.
 template <class Z, class Visit>
 HPCCD_HOST_DEVICE void for_event_polynomials(const Query<Z>& q, Visit&& visit) {
   for (int k = 0; k < 3; ++k) {

@@ -11,7 +11,7 @@
 
 namespace hpccd::exact {
 
-// A point and a segment, by numbers of vertices (v f0 f1 f2 or a0 a1 b0 b1).
+// A point and a segment, by vertex numbers (v f0 f1 f2 or a0 a1 b0 b1).
 struct PointAndSegment {
   int point, from, to;
 };

@@ -13,7 +13,7 @@ inline constexpr int time_bits = 62;
 
 HPCCD_HOST_DEVICE inline std::int64_t to_int64(const Integer<1>& x) { return static_cast<std::int64_t>(x.limbs[0]); }
 
-// The only root of `of` within (m, m+1) / 2^k, simple; or, where `exact`, the number m / 2^k itself.
+// The only root of `of` within (m, m+1) / 2^k, simple; or, if `exact`, the number m / 2^k itself.
 template <class Z, int D>
 struct Root {
   Polynomial<Z, D> of;
@@ -23,11 +23,11 @@ struct Root {
   int before;   // the sign of `of` in the interval below the root
   bool linear;  // whether `of` is of degree 1
 
-  // floor(root * 2^62), for a root that is located.
+  // floor(root * 2^62), once it is located.
   HPCCD_HOST_DEVICE std::int64_t time() const { return to_int64(m) << (time_bits - k); }
 };
 
-// The coefficients times 2^-exponent, the largest about one, in Bernstein form: for guesses.
+// The coefficients times 2^-exponent, the largest about one, in Bernstein form: for initial guesses.
 template <class Z, int D>
 HPCCD_HOST_DEVICE_CALL Cubic<double> approximate(const Polynomial<Z, D>& p, int& exponent) {
   double c[4] = {};
@@ -41,9 +41,9 @@ HPCCD_HOST_DEVICE_CALL Cubic<double> approximate(const Polynomial<Z, D>& p, int&
   return {c[0], 3 * c[0] + c[1], 3 * c[0] + 2 * c[1] + c[2], c[0] + c[1] + c[2] + c[3]};
 }
 
-// Narrows (low, high), in units of 2^-62, to one of them around its only root, x being a guess. Every step is proven by
-// an exact sign; where Newton's do not get there, bisection does. value(x) is exact; newton(value, x) tells how far
-// above the root x is about. True where `low` is the root itself.
+// Narrows (low, high), in units of 2^-62, to a unit interval around its only root, from the guess x. Every step is
+// proven by an exact sign; if Newton's method does not converge, bisection does. value(x) is exact; newton(value, x)
+// approximates the distance of x above the root. True if `low` is the root itself.
 template <class Value, class Newton>
 HPCCD_HOST_DEVICE bool close_in(std::int64_t& low, std::int64_t& high, int before, std::int64_t x, Value&& value_there,
                                 Newton&& newton) {
@@ -59,7 +59,7 @@ HPCCD_HOST_DEVICE bool close_in(std::int64_t& low, std::int64_t& high, int befor
     }
     (s == before ? low : high) = x;
     const double step = s * newton(value, x);
-    // A step that rounds to nothing is one to the other side of the root: it closes the interval.
+    // A step that rounds to zero becomes a step to the other side of the root: it closes the interval.
     if (std::fabs(step) < 1)
       x += s == before ? 1 : -1;
     else

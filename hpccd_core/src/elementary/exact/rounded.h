@@ -11,13 +11,13 @@
 
 namespace hpccd::exact {
 
-// By its Bernstein coefficients, the largest of which is between 1/2 and 1.
+// Represented by its Bernstein coefficients, the largest of which is between 1/2 and 1.
 template <int D>
 struct Rounded {
   std::array<double, D + 1> b;
-  int exponent;  // of the power of two that it was divided by
+  int exponent;  // exponent of the power of two by which it was divided
 
-  // A coefficient is rounded three times to begin with; each halving adds D means, each rounded once.
+  // A coefficient initially has three rounding errors; each halving adds D means with one rounding error each.
   static double error(int halvings) { return (3 + D * halvings) * 0x1p-53; }
 
   // 0: not certain.
@@ -28,7 +28,7 @@ struct Rounded {
       if (sign_of(b[i], halvings) != s) return 0;
     return s;
   }
-  // Whatever the uncertain ones are: one change of sign, so one root, a simple one.
+  // Whatever the uncertain signs are: one change of sign, so one simple root.
   bool certainly_one_root(int halvings) const {
     const int first = sign_of(b[0], halvings);
     if (first * sign_of(b[D], halvings) >= 0) return false;
@@ -51,7 +51,7 @@ struct Rounded {
       for (int j = 0; j < D - i; ++j) right.b[j] = 0.5 * (right.b[j] + right.b[j + 1]);
     }
   }
-  // The value at s in [0, 1], and the derivative there.
+  // The value at s in [0, 1], and the derivative.
   double at(double s, double& derivative) const {
     auto x = b;
     for (int i = D; i > 1; --i)
@@ -61,7 +61,7 @@ struct Rounded {
   }
 };
 
-// False for a polynomial that vanishes throughout.
+// False for the zero polynomial.
 template <class Z, int D>
 bool round(const Polynomial<Z, D>& p, Rounded<D>& rounded) {
   using W = Plus<Z, 1>;
@@ -99,7 +99,7 @@ struct RoundedEvent {
   int n = 0;
 };
 
-// A root that is certainly the only one of [low, low + 1] / 2^halvings, and the polynomial there.
+// A root that is certainly the only one in [low, low + 1] / 2^halvings, and the polynomial there.
 template <int D>
 struct Bracket {
   std::int64_t low;
@@ -107,8 +107,8 @@ struct Bracket {
   Rounded<D> f;
 };
 
-// The first root below limit / 2^62, as a time. `others` tells it where doubles do not: others.in_bracket(bracket)
-// always, others.in_interval(low, halvings), its later end included, and others.after(from / 2^62), if there is one.
+// The first root below limit / 2^62, as a time. `others` decides where doubles cannot: others.in_bracket(bracket)
+// always, others.in_interval(low, halvings), including its later end, and others.after(from / 2^62), if there is one.
 template <int D, int E, class Others>
 class EarlySearch {
  public:
@@ -135,7 +135,7 @@ class EarlySearch {
  private:
   static constexpr int most_halvings = 45, most_steps = 200, most_questions = 2;
 
-  // Of a somewhat larger interval: what is uncertain here is so next to it.
+  // For a slightly larger interval: signs that are uncertain here are uncertain next to it as well.
   std::optional<std::int64_t> ask(std::int64_t low, int halvings) {
     if (++n_questions_ > most_questions) {
       limit_ = 0;

@@ -19,7 +19,7 @@ Polynomial<Big, D> to_big(const Polynomial<Z, D>& p) {
   return big;
 }
 
-// The first time at which a piece counts, in integers.
+// The first time at which a piece applies, in integers.
 template <class Distance, class Condition, int n>
 class InIntegers;
 template <class Z, int D, class Y, int E, int n>

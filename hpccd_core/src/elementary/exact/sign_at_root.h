@@ -14,7 +14,7 @@ HPCCD_HOST_DEVICE bool vanishes_inside(const P& p, const M& m, int k) {
   return sign_at_dyadic(p, m, k) * sign_at_dyadic(p, M(m + M(1)), k) < 0;
 }
 
-// Whether q, not constant, vanishes at the root, which is not exact. Unknown where the root's interval is too wide.
+// Whether q, not constant, vanishes at the root, which is not exact. Unknown if the root's interval is too wide.
 template <class Y, class Z, int D>
 HPCCD_HOST_DEVICE_CALL Known vanishes_at(const Polynomial<Y, 2>& q, const Root<Z, D>& root) {
   Polynomial<Z, 3> f{};
@@ -24,19 +24,19 @@ HPCCD_HOST_DEVICE_CALL Known vanishes_at(const Polynomial<Y, 2>& q, const Root<Z
     const Polynomial<Y, 1> line{{q.c[0], q.c[1]}};
     return known(vanishes_inside(line, root.m, root.k) && sign_at_ratio(f, Y(-q.c[0]), q.c[1]) == 0);
   }
-  // What both vanish at, the remainder does too.
+  // A common root of both is a root of the remainder.
   const auto r = pseudo_remainder(f, q);
   if (r.degree() == 0) return Known::no;
   if (r.degree() == 1) {
     const auto minus_r0 = -r.c[0];
     return known(vanishes_inside(r, root.m, root.k) && sign_at_ratio(q, minus_r0, r.c[1]) == 0);
   }
-  // q divides f, of which the interval holds one simple root: if q vanishes there, it changes sign.
+  // q divides f, of which the interval contains one simple root: if q vanishes there, it changes sign.
   const int s = sign_at_dyadic(q, root.m, root.k) * sign_at_dyadic(q, Time<Z>(root.m + Time<Z>(1)), root.k);
   return s == 0 ? Known::unknown : known(s < 0);
 }
 
-// Narrows the root where that helps. There are signs that stay open: `open` is set then.
+// Narrows the root if that helps. Some signs remain undecided: then `open` is set.
 template <class Y, class Z, int D>
 HPCCD_HOST_DEVICE_CALL int sign_at(const Polynomial<Y, 2>& q, Root<Z, D>& root, bool& open) {
   const int degree = q.degree();

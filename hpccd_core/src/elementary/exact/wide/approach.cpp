@@ -7,7 +7,7 @@
 namespace hpccd::exact {
 namespace {
 
-// The sign of f just before a root of it, where its lowest derivative that does not vanish decides.
+// The sign of f just before one of its roots, by its lowest derivative that does not vanish.
 int sign_before(wide::Coefficients f, wide::Root& root) {
   int before = 1;
   for (auto d = wide::derivative(f);; d = wide::derivative(d)) {
@@ -16,7 +16,7 @@ int sign_before(wide::Coefficients f, wide::Root& root) {
   }
 }
 
-// Whether p is the same at both ends, but for its last bits.
+// Whether p is the same at both ends, except for its last bits.
 bool steady(wide::Coefficients p, const wide::Dyadic& low, const wide::Dyadic& high) {
   constexpr double least_change = 1e-12;
   int e_low, e_high;

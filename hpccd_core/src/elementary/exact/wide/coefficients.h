@@ -56,7 +56,7 @@ inline std::array<Big, 4> seen_from(Coefficients p, const Big& base, int k) {
   const int n = degree_of(p);
   std::array<Big, 4> a;
   for (int i = 0; i <= n; ++i) a[i] = p[i] << (n - i) * k;
-  const Big top = base * a[n];  // met again in every row
+  const Big top = base * a[n];  // reused in every row
   for (int i = 0; i < n; ++i) {
     a[n - 1] += top;
     for (int j = n - 1; j-- > i;) a[j] += base * a[j + 1];
@@ -64,7 +64,7 @@ inline std::array<Big, 4> seen_from(Coefficients p, const Big& base, int k) {
   return a;
 }
 
-// The sign that p certainly has on the whole of [low, high] / 2^k by its Bernstein coefficients there; 0: not certain.
+// The sign that p certainly has on all of [low, high] / 2^k, by its Bernstein coefficients there; 0: not certain.
 inline int sign_on(Coefficients p, const Big& low, const Big& high, int k) {
   const int n = degree_of(p);
   std::array<Big, 4> a = seen_from(p, low, k);
@@ -81,7 +81,8 @@ inline int sign_on(Coefficients p, const Big& low, const Big& high, int k) {
   return s;
 }
 
-// A multiple of the remainder of f by q, one degree below q's; f's degree is at least q's. Zeros may lead the result.
+// A multiple of the remainder of f divided by q, of a degree one below q's; f's degree is at least q's. Leading zeros
+// are possible.
 template <class Number>
 std::vector<Number> pseudo_remainder(std::vector<Number> f, const std::vector<Number>& q) {
   const std::size_t n = q.size();

@@ -8,10 +8,10 @@
 namespace hpccd::exact::wide {
 namespace {
 
-// Integers modulo a prime of 62 bits: what differs from zero here does so there, at a hundredth of the cost.
+// Integers modulo a prime of 62 bits: numbers that differ from zero here do so as integers, at a hundredth of the cost.
 class Residue {
  public:
-  // Of no special form: coordinates are sums of powers of two.
+  // A prime of no special form, since coordinates are sums of powers of two.
   static constexpr std::uint64_t prime = 4349154017897750603;
 
   Residue() = default;
@@ -78,7 +78,7 @@ Numbers common_factor(Coefficients f, Coefficients g) {
 
 Numbers quotient(Numbers f, const Numbers& g) {
   Numbers q(f.size() - g.size() + 1);
-  // A multiple of f that the leading number of g divides at every step.
+  // A multiple of f that the leading coefficient of g divides at every step.
   Big factor = 1;
   for (std::size_t i = 0; i < q.size(); ++i) factor *= g.back();
   for (Big& c : f) c *= factor;

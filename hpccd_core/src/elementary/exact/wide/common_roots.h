@@ -6,11 +6,11 @@
 
 namespace hpccd::exact::wide {
 
-// Whether their remainders end in something else than zero, seen modulo a prime that divides neither leading number: if
-// so, no number is a root of both. False: it stays open.
+// True if the sequence of remainders ends in a number other than zero, modulo a prime that divides neither leading
+// coefficient: then f and g have no common root. False: undecided.
 bool certainly_no_common_root(Coefficients f, Coefficients g);
 
-// The greatest common factor, without content; of degree 0 where no number is a root of both.
+// The greatest common divisor, without content; of degree 0 if there is no common root.
 Numbers common_factor(Coefficients f, Coefficients g);
 
 // A multiple of f / g, without content; g must be a factor of f.
@@ -18,7 +18,7 @@ Numbers quotient(Numbers f, const Numbers& g);
 
 bool divides(const Numbers& g, Coefficients f);
 
-// With the same roots as p, each of them once.
+// A polynomial with the roots of p, each of them simple.
 Numbers square_free(Coefficients p);
 
 }  // namespace hpccd::exact::wide

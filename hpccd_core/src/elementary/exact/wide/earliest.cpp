@@ -10,7 +10,7 @@ namespace {
 struct Event {
   std::int64_t time;
   wide::Root root;
-  bool repeats = false;  // one before it is of the same root
+  bool repeats = false;  // an earlier event has the same root
 };
 
 void add_events(std::vector<Event>& events, wide::Coefficients p) {
@@ -51,7 +51,7 @@ Answer earliest(const Query<Big>& q) {
     for_event_polynomials(q, [&](const auto& p) {
       if (p.degree() > 0) add_events(events, wide::coefficients(p));
     });
-  // Events in the wrong order have the same time.
+  // Events in the wrong order have the same rounded time.
   std::stable_sort(events.begin(), events.end(), [](const Event& x, const Event& y) { return x.time < y.time; });
   for (std::size_t i = 0; i < events.size(); ++i)
     if (!events[i].repeats && touches_at(q, events, i)) return {true, rounded_down(events[i].time)};

@@ -8,7 +8,7 @@
 namespace hpccd::exact::wide {
 namespace {
 
-// Before this many bits it rarely is worth the price to ask whether something vanishes.
+// Below this number of bits, a test whether a polynomial vanishes is rarely worth its cost.
 constexpr int patience = 40;
 
 std::int64_t floor_of(const Dyadic& x) {
@@ -16,12 +16,12 @@ std::int64_t floor_of(const Dyadic& x) {
   return static_cast<std::int64_t>(excess < 0 ? Big(x.m << -excess) : Big(x.m >> excess));
 }
 
-// Of what lies just before x.
+// The floor just before x.
 std::int64_t floor_before(const Dyadic& x) { return x.k < time_bits ? floor_of(x) - 1 : floor_of({x.m - 1, x.k}); }
 
 int sign_at_time(Coefficients q, const Dyadic& t) { return q.empty() ? 0 : sign_at_dyadic(q, t.m, t.k); }
 
-// Of one root; it may turn out to be the middle of the part.
+// Narrows a part with one root, which may turn out to be the middle of the part.
 void narrow(Part& part, std::optional<Dyadic>& exact) {
   if (part.narrow()) return;
   auto halves = part.halves();
@@ -29,7 +29,7 @@ void narrow(Part& part, std::optional<Dyadic>& exact) {
   part = halves.first.variations() ? std::move(halves.first) : std::move(halves.second);
 }
 
-// Whether the one root in the part, a simple one, is that of a factor: then the number of its roots there is odd.
+// Whether the single simple root in the part is a root of a factor: then the factor has an odd number of roots there.
 bool holds_root(const Numbers& factor, const Part& part) {
   return factor.size() > 1 && Part(factor, part.window()).variations() % 2 == 1;
 }
@@ -80,12 +80,12 @@ void FirstTime::remove_repeated_roots() {
   if (repeated.size() == 1) return;
   of_ = quotient(std::move(of_), repeated);
   repeated_ = square_free(repeated);
-  // Factors of what it was may have roots twice.
+  // Factors of its old value may have repeated roots.
   not_zero_.shared.reset();
   for (Condition& condition : at_least_zero_) condition.shared.reset();
 }
 
-// Whether one is negative throughout. Forgets those that are positive throughout.
+// Whether a condition is negative throughout. Removes those that are positive throughout.
 bool FirstTime::excluded(const Window& window, Open& open) const {
   for (std::size_t i = open.size(); i-- > 0;) {
     const Coefficients q = at_least_zero_[open[i]].q;
@@ -102,7 +102,7 @@ bool FirstTime::holds_at(const Dyadic& t) const {
   return sign_at_time(not_zero_.q, t) != 0;
 }
 
-// Of the one root in the part, a simple one.
+// For the single simple root in the part.
 std::optional<std::int64_t> FirstTime::at_root(Part part, const Open& open) {
   std::optional<Dyadic> exact;
   for (const std::size_t i : open)
@@ -119,7 +119,7 @@ int FirstTime::sign_at(Condition& condition, Part& part, std::optional<Dyadic>& 
     if (const int s = sign_inside(seen(condition.q, part.window()))) return s;
     if (asked || part.window().w < patience) continue;
     asked = true;
-    // Mostly those roots at which n vanishes, and with it all conditions.
+    // These are mostly roots at which n vanishes, and with it all conditions.
     if (holds_root(repeated_, part) && divides(repeated_, condition.q)) return 0;
     if (!condition.shared) condition.shared = common_factor(of_, condition.q);
     if (holds_root(*condition.shared, part)) return 0;
@@ -131,7 +131,7 @@ std::int64_t FirstTime::time_of(Part& part, std::optional<Dyadic>& exact) const 
     const std::int64_t first = floor_of(part.window().begin()), last = floor_before(part.window().end());
     if (first == last) return first;
     if (last - first > 1) continue;
-    // The root lies on one side of that time, or there.
+    // The root is on one side of that time, or at it.
     const int before = sign(part.polynomial()[0]), s = sign(value(of_, last, time_bits));
     return s == 0 || s == before ? last : first;
   }

@@ -18,16 +18,16 @@ class FirstTime {
  public:
   explicit FirstTime(const Event& event);
 
-  // floor(t 2^62) for the first t in the window, its end included and its beginning not, if it is below `limit`; there
-  // must be none before `from`.
+  // floor(t 2^62) for the first t in the window, its end included and its beginning excluded, if it is below `limit`;
+  // there must be none before `from`.
   std::optional<std::int64_t> in(const Window& window, std::int64_t from, std::int64_t limit);
 
  private:
   struct Condition {
     Coefficients q;
-    std::optional<Numbers> shared;  // with of_, once that was asked
+    std::optional<Numbers> shared;  // with of_, once it has been computed
   };
-  using Open = std::vector<std::size_t>;  // numbers of conditions
+  using Open = std::vector<std::size_t>;  // indices of conditions
 
   std::optional<std::int64_t> within(Part part, Open open);
   bool excluded(const Window& window, Open& open) const;
@@ -39,7 +39,7 @@ class FirstTime {
 
   Numbers of_;
   bool square_free_ = false;
-  Numbers repeated_;  // the roots that of_ had more than once, each once
+  Numbers repeated_;  // the repeated roots of of_, each once
   Condition not_zero_;
   std::vector<Condition> at_least_zero_;
   std::int64_t from_ = 0, limit_ = 0;

@@ -6,13 +6,13 @@
 namespace hpccd::exact::wide {
 namespace {
 
-// A time that divides the step, and whether the polynomial in question vanishes there.
+// A time that divides the step, and whether the polynomial vanishes there.
 struct Mark {
   Root root;
   bool zero;
 };
 
-// Adds the roots of p to the marks, among which are 0, 1 and all places at which p turns: in between p rises or falls.
+// Adds the roots of p to the marks, which must include 0, 1 and all extrema of p: between them p is monotonic.
 std::vector<Mark> with_roots(Coefficients p, std::vector<Mark> marks) {
   std::vector<Mark> all;
   int before = 0;

@@ -17,7 +17,7 @@ void drop_common_power_of_two(Numbers& a) {
 
 constexpr std::size_t most_coefficients = 7;
 
-// The coefficients over one power of two, the largest about one.
+// The coefficients divided by one power of two, the largest about one.
 void rounded(const Numbers& a, double* p) {
   int e[most_coefficients], most = std::numeric_limits<int>::min();
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -27,14 +27,14 @@ void rounded(const Numbers& a, double* p) {
   for (std::size_t i = 0; i < a.size(); ++i) p[i] = std::ldexp(p[i], std::max(e[i] - most, -1000));
 }
 
-// Their signs in double precision; false where one stays open.
+// Their signs in double precision; false if one is undecided.
 bool rounded_signs(const Numbers& a, int* signs) {
   const std::size_t n = a.size() - 1;
   double b[most_coefficients];
   rounded(a, b);
   signs[0] = sign(a[0]);
   to_bernstein(b, static_cast<int>(n));
-  // Each is a sum of at most 35 numbers below 1, each rounded once and added up with at most 12 roundings.
+  // Each is a sum of at most 35 numbers below 1, each rounded once and added up with at most 12 rounding errors.
   constexpr double error = 64 * 8 * 0x1p-52;
   for (std::size_t i = 1; i <= n; ++i) {
     if (std::fabs(b[i]) <= error) return false;
@@ -50,12 +50,12 @@ void bernstein_signs(const Numbers& p, int* signs) {
   for (std::size_t i = 0; i < a.size(); ++i) signs[i] = sign(a[i]);
 }
 
-// About -num 2^h / den, rounded.
+// An approximation of -num 2^h / den.
 Big rounded_ratio(Big num, Big den, int h) {
   if (num.is_zero()) return 0;
   if (den.sign() < 0) num = -num, den = -den;
   num = -num << h;
-  // As many bits of both as an error below one asks for.
+  // As many bits of both as an error below one requires.
   const int excess = highest_bit(den) - std::max(0, highest_bit(num) - highest_bit(den) + 1) - 4;
   if (excess > 0) num >>= excess, den >>= excess;
   return num / den;
@@ -140,8 +140,8 @@ bool Part::narrow() {
   return moved;
 }
 
-// Where as many roots as there are variations lie together, far from all others, the derivative that has one of them
-// left is almost a straight line.
+// If as many roots as there are variations form a cluster, far from all others, the derivative with one root in the
+// cluster is almost linear.
 bool Part::to_cluster(int gain) {
   const std::size_t v = variations_;
   if (v >= a_.size() || a_[v].is_zero()) return false;
@@ -151,10 +151,10 @@ bool Part::to_cluster(int gain) {
   return move_to(std::clamp(Big(center - 2), Big(0), Big(cells - 4)), h, 2);
 }
 
-// Roots at an end, or next to it on either side, are not all among the variations.
+// Roots at an end, or next to it on either side, are not all counted by the variations.
 bool Part::to_end(int gain) { return move_to(0, gain, 0) || move_to((Big(1) << gain) - 1, gain, 0); }
 
-// A single root, by doubles and with as many bits as they know of it.
+// For a single root: by doubles, with as many bits as they determine.
 bool Part::jump() {
   double p[most_coefficients], size = 0, s = 0.5, low = 0, high = 1, slope = 0;
   rounded(a_, p);
@@ -181,7 +181,7 @@ bool Part::jump() {
   return true;
 }
 
-// What more than this many bits cannot hold: two roots c +- r, or c +- i r, whose r is known to doubles.
+// The largest gain of bits: two roots c +- r, or c +- i r, whose r is known to double precision.
 int Part::most_gain() const {
   constexpr int any = std::numeric_limits<int>::max() / 4;
   if (variations_ != 2 || a_.size() < 3) return any;

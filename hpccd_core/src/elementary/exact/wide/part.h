@@ -20,28 +20,29 @@ struct Window {  // [low / 2^k, low / 2^k + 2^-w], w <= k
   Window part(const Big& j, int h, int e) const;  // [j, j + 2^e] / 2^h of it
 };
 
-// Each of these polynomials is a positive multiple of the one that it stands for. None has a degree above 6.
+// Each of these polynomials is a positive multiple of the one that it represents. No degree exceeds 6.
 Numbers seen(Coefficients p, const Window& window);
 Numbers seen_on_part(const Numbers& a, const Big& j, int h, int e);  // of [0, 1]: [j, j + 2^e] / 2^h
 
-// Sign changes among the Bernstein coefficients: at least as many as there are roots within (0, 1), each counted as
-// often as it is one, and more by an even number.
+// Sign changes among the Bernstein coefficients: the number of roots within (0, 1) with multiplicity, plus an even
+// number.
 int variations(const Numbers& a);
 
 // The sign that it certainly has throughout (0, 1), by the same coefficients; 0: not certain, or zero.
 int sign_inside(const Numbers& a);
 
-// Where a polynomial that does not vanish throughout may have roots, inside the window and not at its ends.
+// An interval in which a nonzero polynomial may have roots, inside the window and not at its ends.
 class Part {
  public:
   Part(Coefficients p, Window window);
 
   const Window& window() const { return window_; }
   const Numbers& polynomial() const { return a_; }
-  int variations() const { return variations_; }  // 0: no root; 1: one, a simple one
+  int variations() const { return variations_; }  // 0: no root; 1: one simple root
 
-  // To a part that has all variations, and so all roots; false where none is found. Roots may lie 1500 binary orders
-  // apart or away from where the step begins: what succeeds is tried with twice the bits the next time.
+  // Narrows to a part with all variations, and so with all roots; false if none is found. Roots may differ by 1500
+  // binary orders of magnitude from each other or from the start of the step: after a success, the next attempt uses
+  // twice the bits.
   bool narrow();
 
   // Its halves, and whether the middle is a root.
@@ -62,7 +63,7 @@ class Part {
   Window window_;
   Numbers a_;
   int variations_ = 0;
-  int gain_ = 2;       // bits to be tried next
+  int gain_ = 2;       // bits of the next attempt
   bool ends_ = false;  // whether the last cluster was not found inside: then the ends are tried too
 };
 

@@ -6,8 +6,8 @@ namespace {
 
 int floor_of_ratio(int a, int b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
 
-// An e such that p, not zero at 0, has no root up to a distance of 2^e: there no other term reaches a power of one half
-// of the constant one, each term a smaller power.
+// An e such that p, which is not zero at 0, has no root within a distance of 2^e: there each other term is less than a
+// smaller power of one half of the constant one.
 int distance_without_root(Coefficients p) {
   int e = std::numeric_limits<int>::max();
   for (int i = 1; i <= degree_of(p); ++i)
@@ -26,7 +26,7 @@ int sign_at_distance(Coefficients p, bool upwards, int e) {
   return sign_at_dyadic(stretched(p, e), upwards ? 1 : -1, 0);
 }
 
-// Both over the power of two that the finer one asks for.
+// Scales both to the power of two of the finer one.
 void align(Dyadic& x, Dyadic& y) {
   if (x.k < y.k) return align(y, x);
   y.m <<= x.k - y.k;
@@ -65,7 +65,7 @@ bool Root::changes_sign(Coefficients q) const {
 }
 
 bool Root::surely_holds(const Root& other) const {
-  // The ends of an interval do not belong to it: a root that is exact could be one of them.
+  // The ends of an interval do not belong to it: an exact root could be one of them.
   return !exact_ && !other.exact_ && not_above(low(), other.low()) && not_above(other.high(), high());
 }
 
@@ -91,9 +91,9 @@ void Root::narrow() {
     approach();
 }
 
-// Brings the root into an interval of 9 to 28 cells of a grid that is no finer than its distance from the ends calls
-// for. All other roots, complex ones too, are at least about as far from it as the nearer end was: p turns or inflects
-// there. So steps gain ground from here on.
+// Narrows the root to an interval of 9 to 28 cells of a grid that is no finer than the distance from the ends requires.
+// All other roots, complex ones included, are at least about as far from it as the nearer end was, where p has an
+// extremum or inflects. From here on steps converge.
 void Root::approach() {
   constexpr int cell_bits = 4;
   int excess = highest_bit(Big(high_ - low_)) - cell_bits;
@@ -139,9 +139,9 @@ void Root::approach_from(const Dyadic& end, bool upwards, int limit) {
     set_base(end, -17, -8, unit);
 }
 
-// Newton's method on the whole interval: with p = a0 + a1 s + a2 s^2 + a3 s^3 seen from its middle, the root is at
-// s = -a0 / (a1 + d), and |d| <= |a2| w + |a3| w^2 for all |s| <= w. One value per doubling of the bits, at half the
-// bits that it yields. Halves the interval where that gains more.
+// Newton's method on the whole interval: with p = a0 + a1 s + a2 s^2 + a3 s^3 around its middle, the root is at s = -a0
+// / (a1 + d), and |d| <= |a2| w + |a3| w^2 for all |s| <= w. One evaluation per doubling of the bits, at half the bits
+// that it yields. Halves the interval if that gains more.
 void Root::step() {
   const int degree = degree_of(local_), k = k_ + 1;
   const Big middle = low_ + high_, w = high_ - low_;
@@ -154,12 +154,13 @@ void Root::step() {
   for (int i = degree; i > 1; --i) d = (d + abs(a[i])) * w;
   const Big least = abs(a[1]) - d;
   if (sign(least) > 0) {
-    // The error of -a0 / a1 is below 2^e. Bits that cost more than all before are not taken, though they come free.
+    // The error of -a0 / a1 is below 2^e. Bits that would make later steps more expensive than all previous ones are
+    // dropped.
     const int most = 64 + k_;
     const int e = d.is_zero() ? -most : highest_bit(a[0]) + highest_bit(d) + 2 - highest_bit(a[1]) - highest_bit(least);
     const int more = std::clamp(-e, 0, most);
     Big num = -a[0] << more, den = a[1];
-    // As many bits of both as an error below one asks for.
+    // As many bits of both as an error below one requires.
     const int quotient_bits = highest_bit(a[0]) - highest_bit(a[1]) + 1 + more;
     const int excess = highest_bit(a[1]) - std::max(quotient_bits, 0) - 4;
     if (excess > 0) num >>= excess, den >>= excess;

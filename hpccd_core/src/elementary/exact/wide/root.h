@@ -21,26 +21,26 @@ struct Dyadic {  // m / 2^k
 class Root {
  public:
   explicit Root(Dyadic x) : low_(x.m), high_(std::move(x.m)), k_(x.k), exact_(true) {}
-  // The only root of p between low and high, a simple one; p has the sign `before` at low and the opposite one at high.
-  // There, or next to there, p turns or inflects, or the step begins or ends.
+  // The only root of p between low and high, which is simple; p has the sign `before` at low and the opposite one at
+  // high. The ends are extrema or inflection points of p or next to them, or the ends of the step.
   Root(Coefficients p, const Dyadic& low, const Dyadic& high, int before);
 
   Coefficients of() const { return of_; }  // unless exact
   bool exact() const { return exact_; }
-  Dyadic low() const { return absolute(low_); }  // of the open interval that holds it; the root itself where exact
+  Dyadic low() const { return absolute(low_); }  // of the open interval that contains it; the root itself if exact
   Dyadic high() const { return absolute(high_); }
 
   // q as a polynomial in the offset from the base, times a power of two, and the sign that it certainly has on the
-  // interval; 0: not certain. The base comes when the root is first narrowed; until then it is 0, and seen(q) is q.
+  // interval; 0: not certain. The base is chosen when the root is first narrowed; until then it is 0, and seen(q) is q.
   std::vector<Big> seen(Coefficients q) const;
   int sign_of_seen(Coefficients seen) const { return exact_ ? 0 : sign_on(seen, low_, high_, k_); }
   bool changes_sign(Coefficients q) const;
-  // Whether the intervals show that the other root lies in this one's; false: maybe not.
+  // Whether the intervals prove that the other root is in this one's interval; false: unknown.
   bool surely_holds(const Root& other) const;
   bool has_base() const { return has_base_; }
   int known_bits() const { return has_base_ ? k_ : 0; }  // of its offset
 
-  // A factor of `of`, in fewer bits or of a lower degree, that has the root too.
+  // A factor of `of`, with fewer bits or of a lower degree, that has the root as well.
   void set_factor(std::vector<Big> factor);
 
   void narrow();

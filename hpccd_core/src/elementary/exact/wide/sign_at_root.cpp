@@ -8,8 +8,8 @@
 namespace hpccd::exact::wide {
 namespace {
 
-// Both multiplied by what makes them coprime where the second one is `of`: den t - num with the root num / den of r, a
-// multiple of it, if q has that root. The lowest terms' denominator divides q's leading coefficient.
+// Both, multiplied so that they are coprime, if the second one is `of`: den t - num with the root num / den of r, or a
+// multiple of it, if q has that root. The denominator in lowest terms divides q's leading coefficient.
 std::vector<Big> common_line(const std::vector<Big>& r, Coefficients q) {
   Big den = abs(gcd(Big(r[1] % q.back()), q.back())), num, rest;
   divide_qr(Big(-r[0] * den), r[1], num, rest);
@@ -17,7 +17,7 @@ std::vector<Big> common_line(const std::vector<Big>& r, Coefficients q) {
   return {-num, den};
 }
 
-// What f and q have in common, in lowest terms where it is of degree 1; empty where they have no common root.
+// The common factor of f and q, in lowest terms if it is of degree 1; empty if they have no common root.
 std::vector<Big> common_factor(Coefficients f, Coefficients q) {
   if (f.size() < q.size()) std::swap(f, q);
   if (q.size() == 2) return common_line(copied<Big>(q), f);

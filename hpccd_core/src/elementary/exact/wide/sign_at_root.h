@@ -6,7 +6,7 @@
 
 namespace hpccd::exact::wide {
 
-// Narrows the root where that helps. One of q and root.of() must be of degree 2 at most.
+// Narrows the root if that helps. One of q and root.of() must be of degree 2 at most.
 int sign_at(Coefficients q, Root& root);
 
 }  // namespace hpccd::exact::wide
