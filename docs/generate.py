@@ -99,10 +99,14 @@ def site_links(text: str, folder: Path, page_folder: Path) -> str:
     def named(match: re.Match) -> str:
         words, target = match.groups()
         file, _, anchor = target.partition("#")
+        anchor = "" if file.endswith("README.md") else anchor  # the first page of the site has other headings
         if "://" in target or not file:
             return match.group(0)
         path = (folder / file).resolve()
-        path = {ROOT / "README.md": ROOT / "docs/index.md"}.get(path, path)
+        path = {
+            ROOT / "README.md": ROOT / "docs" / "index.md",
+            ROOT / "CONTRIBUTING.md": ROOT / "docs" / "generated" / "contributing.md",
+        }.get(path, path)
         if path.is_relative_to(ROOT / "docs"):
             return f"[{words}]({os.path.relpath(path, page_folder)}{'#' if anchor else ''}{anchor})"
         name = str(path.relative_to(ROOT))

@@ -134,7 +134,7 @@ class StopListener:
             if self._alive is not None and self._alive < self._publishers:
                 return f"{self._alive} of {self._publishers} publishers are alive on {self._topic}."
             if self._value:
-                return f"It was said on {self._topic}."
+                return f"{self._topic} is true"
             several = max(self._publishers, self._alive or 0) > 1
             if several and 1e-9 * (system - self._sent_true) < self._timeout:
                 return f"One of several publishers said it on {self._topic}."

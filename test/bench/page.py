@@ -113,6 +113,12 @@ def _robots(rows: list[dict]) -> list[dict]:
     return [sorted(group, key=lambda r: r["whole_median_ms"])[len(group) // 2] for group in groups.values()]
 
 
+def _with_gpu(rows: list[dict]) -> list[dict]:
+    """The scenes beside the peer, with the median of the GPU from another result."""
+    lines = by("scene", "variant")([row for row in rows if "variant" in row])
+    return [{**line, "gpu_ms": only(scene=line["scene"], way="gpu")(rows)[0]["median_ms"]} for line in lines]
+
+
 def _same(*keys: str) -> lab.Columns:
     return {key: key for key in keys}
 
@@ -139,6 +145,15 @@ SIZE = _same("scene", "triangles", "contacts")
 OVER_ALL = {"first": "first (/ all)", "step": "`collision_free_step` (/ all)", "trial": "trial steps (/ all)"}
 METHODS = {f"`{name}`": name for name in ("default", "published", "naive", "front")}
 TABLES = {
+    "peer-exact": Table(
+        ("peer-h200-4-of-16-cores", "gpu-exact-h200"),
+        SIZE
+        | _whole(contacts="contacts")
+        | {"ipctk, earliest": cell("ipctk", shown=lambda row: row["median_ms"])}
+        | {"hpccd, earliest": cell("cpu first", shown=lambda row: row["median_ms"])}
+        | {"hpccd, all": "median_ms", "hpccd on the GPU, all": "gpu_ms"},
+        _with_gpu,
+    ),
     "peer": Table(
         ("cpu-4-cores",),
         SIZE

@@ -108,7 +108,7 @@ def test_true_unless_somebody_says_false(place):
     place.until(lambda: not listener.stop, "false")
     assert listener.reason == ""
     speaker.says = True
-    place.until(lambda: listener.stop and "said" in listener.reason, "true")
+    place.until(lambda: listener.stop and listener.reason.endswith("/stop is true"), "true")
     speaker.says = False
     place.until(lambda: not listener.stop, "false")
     assert changes == [False, True, False]

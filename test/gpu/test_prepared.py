@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Prepared detections, in CUDA graphs and without: the same contacts as `detect`, or none and the reason."""
+"""Detections that are prepared: in graphs and out of them the same contacts as ever, or none and the reason."""
 
 import gc
 

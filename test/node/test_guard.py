@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An exception in a callback does not end the node: it continues and reports it."""
+"""No callback that raises ends the node: it goes on, and tells of it."""
 
 import time
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The topic stop of a node as a process: true if meshes are closer than stop_distance, or the state is unknown."""
+"""The topic stop of a node as a process: true where meshes come near, and where nobody knows."""
 
 import contextlib
 import math

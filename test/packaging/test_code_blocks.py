@@ -35,7 +35,8 @@ class Block:
 class Run:
     command: str
     expected: str | None
-    source: str = ""  # of a Python program
+    file: str = ""  # written before
+    text: str = ""
 
 
 def blocks(page: Path) -> list[Block]:
@@ -48,7 +49,7 @@ def blocks(page: Path) -> list[Block]:
         if language == "text" and found and not between.strip():
             found[-1].output = text
         else:
-            found.append(Block(language, text, between.strip().rpartition("\n")[2], None))
+            found.append(Block(language, text, between.strip().rpartition("\n")[2].strip(), None))
         end = match.end()
     return found
 
@@ -61,11 +62,13 @@ def runs(page: Path) -> list[Run]:
         if block.language == "console":
             for command, output in re.findall(r"^\$ (.*(?:\n> .*)*)\n((?:(?!\$ ).*\n)*)", block.text, re.MULTILINE):
                 found.append(Run(command.replace("\n> ", "\n"), output or None))
-        elif block.language == "python" and usable(block.text):
-            named = re.match(r"# (\w+\.py)\n", block.text)
-            name = named.group(1) if named else f"block_{number}.py"
-            later = named and f"python {name}" in consoles
-            found.append(Run("" if later else f"python {name}", block.output, f"{name}\n{block.text}"))
+            continue
+        named = re.match(r"(?:#|//|<!--) (\w+\.\w+)(?: -->)?\n", block.text)
+        file = named.group(1) if named else f"block_{number}.py"
+        if block.language == "python" and usable(block.text) and f"python {file}" not in consoles:
+            found.append(Run(f"python {file}", block.output, file, block.text))
+        elif named:
+            found.append(Run("", None, file, block.text))
     return found
 
 
@@ -92,7 +95,7 @@ def test_programs_and_commands(page, tmp_path):
         shown = f"{run.command}\n{printed}"
         if run.expected is None:
             assert status == 0, shown
-            assert printed or not (run.source and run.command), f"prints nothing:\n{run.source}"
+            assert printed or not (run.text and run.command), f"prints nothing:\n{run.text}"
         else:
             assert doctest.OutputChecker().check_output(run.expected, printed, SHOWN), f"{shown}\nnot:\n{run.expected}"
 
@@ -101,9 +104,8 @@ def session(wanted: list[Run], folder: Path) -> list[tuple[int, str]]:
     """Status and output of each, in one shell."""
     script = ["trap 'kill $(jobs -p) 2>/dev/null; wait' EXIT"]
     for number, run in enumerate(wanted):
-        if run.source:
-            name, _, text = run.source.partition("\n")
-            (folder / name).write_text(text)
+        if run.file:
+            (folder / run.file).write_text(run.text)
         command = run.command or ":"
         if command.rstrip().endswith("&"):
             command = f"{command.rstrip()[:-1]} > background_{number}.txt 2>&1 &"
@@ -142,3 +144,11 @@ def test_parameter_files(page, tmp_path):
             given = read_parameters(file)
             settings, meshes = values.checked(given)
             assert not values.unknown(given, meshes, settings["robots"])
+
+
+@each_page
+def test_what_is_not_run_says_why(page):
+    """Shell commands that need root, a network, a GPU or minutes; all others are console blocks."""
+    for block in blocks(page):
+        if block.language in ("sh", "bash"):
+            assert re.fullmatch(r"<!-- not run: .+ -->", block.before), block.text

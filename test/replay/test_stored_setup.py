@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The stored set-up of the node is checked like the node's parameters, before anything is computed."""
+"""What a recording tells of its node is checked as the node checks its parameters, before anything is computed."""
 
 import json
 import math
