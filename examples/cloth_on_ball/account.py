@@ -26,7 +26,7 @@ class Account:
         self._unexplained = self._turning = 0.0
 
     def enter(self, move, seconds: float) -> None:
-        """After a move (None: before the first) that took so many seconds."""
+        """After a move (None: before the first) that took this many seconds."""
         simulation, ledger = self._simulation, self._simulation.ledger
         before = self._queries.seconds
         self._intersections.append(self._queries.intersections(simulation.positions))

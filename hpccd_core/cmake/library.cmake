@@ -53,7 +53,7 @@ endfunction()
 
 hpccd_add_library(hpccd_core_static STATIC)
 set_target_properties(hpccd_core_static PROPERTIES EXPORT_NAME core_static)
-# Consumers of an installed archive find the CUDA run-time library anew: it lies elsewhere on their machine.
+# Consumers of an installed archive find the CUDA run-time library again: it lies elsewhere on their machine.
 target_link_libraries(hpccd_core_static PUBLIC Threads::Threads)
 foreach(library IN LISTS hpccd_cuda_libraries)
   target_link_libraries(hpccd_core_static PUBLIC "$<BUILD_INTERFACE:${library}>")

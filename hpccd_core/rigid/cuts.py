@@ -14,7 +14,7 @@ from hpccd_core.rigid.motion import Motion
 
 @dataclass(frozen=True)
 class Cut:
-    """``parts``: of equal duration. ``deviation``: the greatest of all meshes with so many.
+    """``parts``: of equal duration. ``deviation``: the greatest of all meshes with this number.
 
     ``enough``: False where it stays above the tolerance, because more than ``most`` parts would be needed. The margins
     hold all the same: nothing is missed, more is reported in excess.

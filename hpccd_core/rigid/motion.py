@@ -16,7 +16,7 @@ class Motion(Protocol):
     """Of one mesh, in one step that is cut into ``parts`` equal ones."""
 
     def vertices(self, cut: int, parts: int) -> np.ndarray:
-        """(n,3) at the end of so many parts: 0 is the start of the step. Not to be written to."""
+        """(n,3) at the end of this number of parts: 0 is the start of the step. Not to be written to."""
 
     def deviation(self, parts: int) -> float:
         """Not below how far the straight lines between exact cuts are from the motion, at the same time."""

@@ -34,7 +34,7 @@ std::shared_ptr<const Scene> checked(std::shared_ptr<const Scene> scene, const O
   const auto here = static_cast<int>(gpu::status().devices.size());
   if (o.gpus > here)
     throw InvalidArgument("gpus: " + std::to_string(o.gpus) + " were asked for, " + std::to_string(here) +
-                          " are usable here; give at most so many, or 0 for all");
+                          " are usable here; give at most this number, or 0 for all");
   return scene;
 }
 

@@ -19,7 +19,7 @@
 
 namespace {
 
-// So many allocations succeed, then one fails; negative: none does.
+// This many allocations succeed, then one fails; negative: none does.
 std::atomic<long> allocations_left{-1};
 
 void* allocate(std::size_t size, std::size_t alignment) {
@@ -68,7 +68,7 @@ std::optional<bool> ends(long n, F&& f) {
   return ended;
 }
 
-// At least so many allocations were tried, one after the other: that of a test which tries none says nothing.
+// At least this many allocations were tried, one after the other: that of a test which tries none says nothing.
 constexpr long some = 10;
 
 constexpr std::uint32_t n_triangles = 40;

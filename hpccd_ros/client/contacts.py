@@ -36,7 +36,7 @@ def meshes_of(message: Any, name: str, count: int) -> NDArray[np.uint32]:
 class ContactArrays:
     """The N contacts of one message in their canonical order; features are numbered within their mesh.
 
-    mesh_names: of the scene. n_vertex_face, n_edge_edge, n_edge_face: so many contacts, in this order, are of each
+    mesh_names: of the scene. n_vertex_face, n_edge_edge, n_edge_face: number of contacts, in this order, of each
     kind; edge-face ones are told only by ``~/detect``, for query ``intersections``.
     mesh_a, mesh_b: (N,) uint32, indices into mesh_names: the mesh of each side.
     features_a: (N, 2) uint32, of mesh_a: vertex and ``ContactArray.NONE``, or the two vertices of the edge.

@@ -34,7 +34,7 @@ STOP_TOPIC: str = topic_names.STOP
 
 
 def stop_qos(stop_timeout: float = STOP_TIMEOUT) -> QoSProfile:
-    """Subscription to stop that hears of it where nothing came for so many seconds: at least those of the node's
+    """Subscription to stop that is notified when nothing came for this many seconds: at least those of the node's
     parameter ``stop_timeout``, else nothing ever comes.
 
     Raises TypeError or ValueError for what can be no such time.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the core tells of one snapshot -> messages: near pairs and intersections as ContactArray, smallest distances as
+"""Results of the core for one snapshot as messages: near pairs and intersections as ContactArray, smallest distances as
 DistanceArray."""
 
 import math
@@ -23,7 +23,7 @@ KINDS = {
 def fill_proximity(
     message: ContactArray, near: hc.Proximity, layout: Layout, *, max_contacts: int, outputs: tuple[str, ...]
 ) -> None:
-    """Write all but header, start, step, accuracy and backend. max_contacts: 0: all; else so many of the nearest, in
+    """Write all but header, start, step, accuracy and backend. max_contacts: 0: all; else this many of the nearest, in
     canonical order. outputs: whether to send closest, where the core has computed it."""
     pairs, distance = FeaturePairs.of(near.vf, near.ee), np.concatenate([near.vf_distance, near.ee_distance])
     closest = near.closest if "closest" in outputs and len(near.closest) == len(pairs) else None
@@ -55,7 +55,7 @@ def fill_distances(
     before: list[hc.Gap] | None = None,
     seconds: float = 0.0,
 ) -> None:
-    """Write all but header, step, accuracy and backend. before: those of so many ``seconds`` earlier, if known."""
+    """Write all but header, step, accuracy and backend. before: those of ``seconds`` earlier, if known."""
     count = len(gaps)
     kind, meshes = np.empty(count, np.uint8), np.empty((count, 2), np.uint32)
     features, points = np.full((count, 2, 2), DistanceArray.NONE, np.uint32), np.zeros((count, 2, 3))

@@ -31,7 +31,7 @@ WRITING = DetectAction.Feedback.WRITING
 
 
 class RequestError(ValueError):
-    """A request that cannot be answered; the text says what to mend."""
+    """A request that cannot be answered; the text says what to fix."""
 
 
 @dataclass(frozen=True)

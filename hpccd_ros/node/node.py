@@ -22,8 +22,8 @@ from hpccd_ros.node.stop_watch import StopWatch
 from hpccd_ros.node.stream_detection import StreamDetection
 from hpccd_ros.node.unknown_meshes import UnknownMeshWatch
 
-# s. Once in so long, the pages that a message takes anew cost little; a node that once had to hold much, because its
-# machine was busy for seconds, is not larger ever after.
+# s. At this interval the pages that a message allocates again cost little; a node that once held much, because its
+# machine was busy for seconds, does not stay larger.
 GIVE_BACK_EVERY = 60.0
 SUCCESS = TransitionCallbackReturn.SUCCESS
 

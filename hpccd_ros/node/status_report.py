@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the node tells of itself on /diagnostics: its accounts as messages."""
+"""What the node reports about itself on /diagnostics: its accounts as messages."""
 
 import resource
 import time
@@ -144,7 +144,7 @@ class Reporter:
         return self._status("detection", DiagnosticStatus.OK, f"{rate:.1f} detections a second ({state})", values)
 
     def _errors(self, count: int, last: str) -> DiagnosticStatus:
-        # For good: what else went wrong with it nobody knows.
+        # Permanent: what else it broke is unknown.
         level = DiagnosticStatus.ERROR if count else DiagnosticStatus.OK
         text = f"{count} unexpected errors, the last: {last}" if count else "none"
         return self._status("errors", level, text, {"errors": count, "last_error": last})

@@ -184,5 +184,5 @@ def _check_reach(description: urdf.Description, meshes: list[RobotMesh]) -> None
     if not reach <= LARGEST_OF_POSES:
         raise RobotError(
             f"{urdf.DOCUMENT}: stretched out the robot would reach {reach:g}, and {LARGEST_OF_POSES:g} is the most; "
-            "mend the origins of joints or the sizes of links"
+            "fix the origins of joints or the sizes of links"
         )

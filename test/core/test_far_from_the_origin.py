@@ -11,7 +11,7 @@ SPACING = 2.0**-19  # of doubles near 1e10
 
 
 def points_beside_points(steps, seed):
-    """Scene of N vertices and N faces that are points, near each other in pairs, so many steps apart; (vertices,
+    """Scene of N vertices and N faces that are points, near each other in pairs, a number of steps apart; (vertices,
     distance). All coordinates are multiples of the spacing, so differences and their squares are exact."""
     rng = np.random.default_rng(seed)
     first = np.round(rng.uniform(-0.5, 0.5, (N, 3)) / SPACING) * SPACING + 1e10

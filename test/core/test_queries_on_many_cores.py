@@ -43,7 +43,7 @@ QUERIES = {
 
 
 def crowd(rng):
-    """So many blocks of triangles that there is work for many threads."""
+    """Enough blocks of triangles that there is work for many threads."""
     return random_scenes.combine(
         random_scenes.crumpled_sheet(rng, 14), random_scenes.lattice_sheet(rng, 9), random_scenes.soup(rng, 60)
     )

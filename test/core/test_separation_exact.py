@@ -33,7 +33,7 @@ SEPARATION = 0.25
 
 
 def five_small_meshes(rng):
-    """Few enough features for an oracle that asks about each pair anew whenever a separation changes."""
+    """Few enough features for an oracle that asks about each pair again whenever a separation changes."""
     sheets = random_scenes.crumpled_sheet(rng, 4), random_scenes.lattice_sheet(rng, 4)
     bodies = random_scenes.tetrahedron(rng), random_scenes.tetrahedron(rng), random_scenes.soup(rng, 10)
     return random_scenes.combine(*sheets, *bodies)

@@ -159,7 +159,7 @@ def test_transform_of_no_time_is_refused(static):
         buffer.lookup("hand", "world", SECOND)
 
 
-def test_source_that_starts_anew_is_not_mixed_with_its_past():
+def test_source_that_starts_fresh_is_not_mixed_with_its_past():
     buffer = TransformBuffer()
     buffer.add("world", "hand", turn(0), 100 * SECOND)
     for k in (1, 2):
@@ -196,11 +196,11 @@ def of_now(buffer, stamp, source="hand"):
 def test_a_run_shorter_than_a_second_is_told_from_what_is_late_by_its_order():
     late = after_a_short_run(100, 120, 90, 490, 200, 210, 220, 230, 500)
     assert [of_now(late, stamp) for stamp in (0, 100, 105, 120, 300, 495)] == [False, True, False, True, False, True]
-    anew = after_a_short_run(5, 15, 25, 35, 45)
-    assert [of_now(anew, stamp) for stamp in (0, 10, 30, 45, 50, 300)] == [None, True, True, True, None, None]
-    assert of_now(anew, 100, "foot") is None, "of another frame, and from before as well"
-    anew.add("world", "foot", NOW, 20 * MS)
-    assert of_now(anew, 20, "foot")
+    fresh = after_a_short_run(5, 15, 25, 35, 45)
+    assert [of_now(fresh, stamp) for stamp in (0, 10, 30, 45, 50, 300)] == [None, True, True, True, None, None]
+    assert of_now(fresh, 100, "foot") is None, "of another frame, and from before as well"
+    fresh.add("world", "foot", NOW, 20 * MS)
+    assert of_now(fresh, 20, "foot")
 
 
 def test_more_samples_behind_than_are_kept():
@@ -213,7 +213,7 @@ def test_more_samples_behind_than_are_kept():
 
 
 @pytest.mark.parametrize("now", [(), (5,), (5, 15), (5, 15, 25, 35, 45), tuple(range(5, 400, 10))])
-def test_where_a_mesh_begins_anew_nothing_from_before_is_used(now):
+def test_where_a_mesh_begins_fresh_nothing_from_before_is_used(now):
     buffer = after_a_short_run(*now)
     buffer.forget_future(10 * MS)
     buffer.forget_future(10 * MS)

@@ -29,7 +29,7 @@ def assert_on_gpu(detector):
 
 
 def garments(worlds, n=14, seed=0, dtype=np.float32):
-    """(scene, t0, t1) of a crumpling sheet in so many worlds, of different scale and place; the last of many rests."""
+    """(scene, t0, t1) of a crumpling sheet in W worlds, of different scale and place; the last of many rests."""
     rng = np.random.default_rng(seed)
     scene = hc.Scene()
     scene.add_mesh("sheet", scenes.sheet(n))

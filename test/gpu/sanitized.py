@@ -110,7 +110,7 @@ for worlds in (None, 3):
     detection.enqueue()
     print("prepared", worlds, detection.counts.to_host())
 
-# Coordinates of so many bits that the CPU decides: what it finds is added on the device.
+# Coordinates with too many bits for the device: the CPU decides: what it finds is added on the device.
 rng = np.random.default_rng(300)
 faces, t0, t1 = scenes.lattice(rng, 10)
 t1 = np.where(rng.random(t1.shape) < 0.2, rng.integers(-3, 4, t0.shape) * 2.0**-300, t1)

@@ -74,7 +74,7 @@ def test_torch_takes_them_in_place():
 
 @pytest.mark.parametrize("worlds", (None, 1, 3))
 def test_of_nothing(worlds):
-    """No rows: shapes and dtypes as ever, and nobody needs an address."""
+    """No rows: the usual shapes and dtypes, and nobody needs an address."""
     scene, _, _ = crumpled()
     flat = scenes.flat(N)
     given = flat if worlds is None else np.stack([flat] * worlds)

@@ -91,7 +91,7 @@ def test_a_held_answer_survives_the_failures_that_follow():
 
 
 def test_a_step_that_fails_is_answered_or_refused_and_the_next_are_right():
-    """Keeping the last positions may fail as well: then RuntimeError says so, and stepping begins anew."""
+    """Keeping the last positions may fail as well: then RuntimeError says so, and stepping begins again."""
     scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(3), 10)])
     cpu = hc.Detector(scene, backend="cpu")
     expected = cpu.detect(t0, t1)

@@ -46,7 +46,7 @@ def test_a_moving_scene_stays_equal():
     scene, v, _ = scenes.join([scenes.crumpled(rng, 30)])
     detectors = [hc.Detector(scene, backend=backend) for backend in ("cpu", "gpu", "hybrid", "auto")]
     detectors.append(hc.Detector(scene, backend="hybrid", method="published"))
-    for _ in range(40):  # far enough that trees wear out and are built anew
+    for _ in range(40):  # far enough that trees wear out and are rebuilt
         w = v + rng.normal(0, 0.8, v.shape)
         assert len({detector.detect(v, w).hash for detector in detectors}) == 1
         v = w

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Detections that are prepared: in graphs and out of them the same contacts as ever, or none and the reason."""
+"""Detections that are prepared: in graphs and out of them the same contacts as without, or none and the reason."""
 
 import gc
 

@@ -153,7 +153,7 @@ def test_a_moving_scene():
     rng = np.random.default_rng(11)
     scene, v, _ = scenes.join([scenes.crumpled(rng, 20)])
     detectors = [hc.Detector(scene, backend=b, minimum_separation=0.05) for b in ("cpu", *BACKENDS, "auto")]
-    for _ in range(12):  # far enough that trees wear out and are built anew
+    for _ in range(12):  # far enough that trees wear out and are rebuilt
         w = v + rng.normal(0, 0.8, v.shape)
         assert len({detector.detect(v, w).hash for detector in detectors}) == 1
         v = w

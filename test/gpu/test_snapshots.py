@@ -147,7 +147,7 @@ def test_a_tree_wears_out_whatever_the_distances():
         gpu.proximity(w if frame else v, 0.1 + 1e-6 * frame)
         assert_on_gpu(gpu)
         built.append(gpu.profile.get("build", 0) > 0)
-    assert built == [True, False, True, False, False]  # the device tells of a frame when the next one begins
+    assert built == [True, False, True, False, False]  # the device reports a frame when the next one begins
 
 
 def test_the_hybrid_leaves_them_to_the_cpu():

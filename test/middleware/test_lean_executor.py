@@ -153,7 +153,7 @@ def test_what_a_callback_brings_forth_after_it_waited_is_done(spinning):
 
 
 def _turns(executor_type, messages=20):
-    """How often it asks whether a subscription may be waited for, while so many messages come one by one."""
+    """How often it asks whether a subscription may be waited for, while this many messages come one by one."""
     came, asked = [], []
     with _spun(executor_type) as (executor, node):
         subscription = node.create_subscription(Header, "numbers", came.append, 10)

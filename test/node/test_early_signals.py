@@ -36,7 +36,7 @@ def has_loaded(library):
 
 
 def told_to_end(command, number, moment, delay=0.0):
-    """(exit status, output) of a node that is sent a signal so many seconds after ``moment(pid)`` has come true."""
+    """(exit status, output) of a node that is sent a signal this many seconds after ``moment(pid)`` has come true."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     node = subprocess.Popen(command, cwd=HERE, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     deadline = time.monotonic() + PATIENCE

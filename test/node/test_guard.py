@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""No callback that raises ends the node: it goes on, and tells of it."""
+"""No callback that raises ends the node: it goes on and reports it."""
 
 import time
 

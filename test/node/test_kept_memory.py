@@ -62,7 +62,7 @@ node.create_subscription(UInt8MultiArray, "large", lambda data: taken.append(len
 publisher = node.create_publisher(UInt8MultiArray, "large", profile)
 while not publisher.get_subscription_count():
     time.sleep(0.05)
-# CDR: no dimensions, offset 0, so many bytes.
+# CDR: no dimensions, offset 0, number of bytes.
 data = bytes([0, 1, 0, 0]) + bytes(8) + (10**6).to_bytes(4, "little") + bytes(10**6)
 before = allocated()
 for _ in range({DEPTH}):

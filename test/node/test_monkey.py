@@ -79,7 +79,7 @@ class Caller:
         return future
 
     def settle(self, most=0):
-        """Wait until at most so many calls are under way; each answer is looked at."""
+        """Wait until at most this many calls are under way; each answer is looked at."""
 
         def few():
             done = [call for call in self._under_way if call[2].done()]

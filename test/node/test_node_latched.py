@@ -23,7 +23,7 @@ def answered(node, answers):
 
 
 def late(node, profile, wanted):
-    """What one who comes now hears of the past: waits for so many, and a moment for more."""
+    """Latched messages for a late subscriber: waits for this number, and a moment for more."""
     heard = []
     subscription = node.peer.node.create_subscription(ContactArray, "contacts", heard.append, profile)
     node.wait_until(lambda: subscription.get_publisher_count(), "the publisher of contacts")

@@ -307,7 +307,7 @@ def test_a_file_that_cannot_be_used_ends_the_start(start_node, tmp_path):
         ):
             refused = set_parameter(node, f"robot.crane.{parameter}", value)
             assert not refused.successful and reason in refused.reason, refused.reason
-        file.write_text(crane.URDF)  # mended while the node runs
+        file.write_text(crane.URDF)  # fixed while the node runs
         for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
             assert change_state(node, transition)
         assert node.stop() == 0
@@ -525,7 +525,7 @@ def test_mesh_files_of_a_refused_description_do_not_take_the_place_of_those_in_u
     publisher = describe(node, described("first", "no mesh"))
     node.wait_until(lambda: "boom.obj" in node.peer.statuses["frames"][1], "what is wrong with the first")
     boom = "v 0 0 0\nv .4 0 0\nv 0 .4 0\nv 0 0 .4\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
-    publisher.publish(String(data=described(second, boom) + "<!-- mended -->"))
+    publisher.publish(String(data=described(second, boom) + "<!-- fixed -->"))
     node.wait_until(lambda: "robot crane" not in node.peer.statuses["frames"][1], "the second")
     node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
     joints = node.peer.publisher(JointState, "joint_states", qos.TRANSFORMS)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The topic stop of a node as a process: true where meshes come near, and where nobody knows."""
+"""The topic stop of a node as a process: true when meshes come close, and when the state is unknown."""
 
 import contextlib
 import math

@@ -264,7 +264,7 @@ def test_simulated_time(start_node):
     assert_same_contacts(message, *frames[:2], scene_of(cloth=FACES))
     assert node.peer.reported_at == 0, "no /clock yet: simulated time is zero, and reports go on"
     clock = node.peer.publisher(Clock, "clock")
-    for seconds in (1234, 5):  # a simulator that starts anew goes back
+    for seconds in (1234, 5):  # a simulator that starts again goes back
         now = Clock(clock=fields.ns_to_stamp(seconds * 10**9))
 
         def told(now=now):

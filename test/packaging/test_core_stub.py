@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """hpccd_core/_core.pyi names what the compiled module has, with the same arguments.
 
-What pybind11 says of the module, to write the stub anew from: .venv/bin/stubgen -m hpccd_core._core -o build/stubs
+What pybind11 says of the module, to rewrite the stub from: .venv/bin/stubgen -m hpccd_core._core -o build/stubs
 """
 
 import ast

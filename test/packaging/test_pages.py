@@ -104,6 +104,17 @@ def options(command):
     return found
 
 
+@each_page
+def test_words(page):
+    """Plain English: none of the words that read as translated."""
+    found = re.findall(
+        r"\b(?:anew|mend|mended|as ever|so many|will not do|nobody knows|is told of|tells of|stands alone)\b",
+        " ".join(page.read_text().split()),
+        re.IGNORECASE,
+    )
+    assert not found
+
+
 def test_readme_is_two_screens():
     assert len((ROOT / "README.md").read_text().splitlines()) <= 200
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """SIGKILL at any moment: what was flushed is there, the loss is bounded, and the rest verifies.
 
-HPCCD_KILLS=50 pytest -s test/record/test_recorder_killed.py: so many kills (default 8), with the loss told.
+HPCCD_KILLS=50 pytest -s test/record/test_recorder_killed.py: number of kills (default 8); prints the loss.
 """
 
 import os

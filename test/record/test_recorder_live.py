@@ -131,7 +131,7 @@ def _verified_file(file):
 
 
 def _frames_from(path, seconds: float) -> int:
-    """How many whole frames (cloth and ball) a player publishes that begins so many seconds into the recording."""
+    """How many whole frames (cloth and ball) a player publishes that begins this many seconds into the recording."""
     with Recording(path) as recording:
         messages = [(message.topic, message.log_time) for message in recording.messages()]
     begin = messages[0][1] + seconds * 1e9

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a recording tells of its node is checked as the node checks its parameters, before anything is computed."""
+"""The parameters in a recording are checked as the node checks its parameters, before anything is computed."""
 
 import json
 import math

@@ -146,7 +146,7 @@ def test_what_is_kept_is_bounded():
         joints.at(3 * MOST_SAMPLES - 1)
 
 
-def test_a_source_that_begins_anew_at_an_earlier_time_is_followed():
+def test_a_source_that_begins_fresh_at_an_earlier_time_is_followed():
     joints = history()
     joints.add(5 * HISTORY_NS, ["slide", "turn"], [5.0, 0.0])
     joints.add(100, ["slide", "turn"], [1.0, 0.0])
@@ -176,7 +176,7 @@ def of_now(joints, stamp):
 
 
 @pytest.mark.parametrize("now", [(), (5,), (5, 15), (5, 15, 25, 35, 45), tuple(range(5, 400, 10))])
-def test_where_a_mesh_begins_anew_nothing_from_before_is_used(now):
+def test_where_a_mesh_begins_fresh_nothing_from_before_is_used(now):
     joints = after_a_short_run(*now)
     joints.forget_future(10 * MS)
     joints.forget_future(10 * MS)
@@ -187,8 +187,8 @@ def test_where_a_mesh_begins_anew_nothing_from_before_is_used(now):
 def test_a_run_shorter_than_a_second_is_told_from_what_is_late_by_its_order():
     late = after_a_short_run(100, 120, 90, 490, 200, 210, 220, 230, 500)
     assert [of_now(late, stamp) for stamp in (0, 100, 105, 120, 300, 495)] == [False, True, False, True, False, True]
-    anew = after_a_short_run(5, 15, 25, 35, 45)
-    assert [of_now(anew, stamp) for stamp in (0, 10, 30, 45, 50, 300)] == [None, True, True, True, None, None]
+    fresh = after_a_short_run(5, 15, 25, 35, 45)
+    assert [of_now(fresh, stamp) for stamp in (0, 10, 30, 45, 50, 300)] == [None, True, True, True, None, None]
 
 
 FAR = 360 * HISTORY_NS

@@ -14,7 +14,7 @@ SECOND = 10**9
 
 def test_publishers_are_told_apart_by_their_numbers():
     numbers = PublisherNumbers()
-    assert [numbers.of(number, lambda: False) for number in (5, 6, 9, 1, 2)] == [None] * 5, "one, one that begins anew"
+    assert [numbers.of(number, lambda: False) for number in (5, 6, 9, 1, 2)] == [None] * 5, "one, one that begins again"
     labels = [numbers.of(number, lambda: True) for number in (700, 3, 701, 4, 705, 6, 706)]
     assert labels == [1, 0] * 3 + [1]
     assert [numbers.of(number, lambda: False) for number in (1, 2)] == [None, None], "all others have left"
@@ -35,7 +35,7 @@ def test_two_that_differ_contradict_each_other_until_one_is_silent():
     assert "joint 'z', one sent 0 for 12500000000 ns" in publishers.contradiction(0, 12_500_000_000, [("z", 0.0)])
     assert said(publishers, (0, 2.6 + HISTORY_NS / SECOND, 0.0)) == [False]
     assert said(publishers, (0, 20, 0.0), (1, 20, 1e-3)) == [False, True], "at the same time"
-    assert not publishers.contradiction(0, 21 * SECOND, [("other", 5.0)]), "a joint that it alone tells of"
+    assert not publishers.contradiction(0, 21 * SECOND, [("other", 5.0)]), "a joint that only it publishes"
 
 
 @pytest.mark.parametrize("continuous", [False, True])

@@ -66,8 +66,8 @@ def test_motions_go_by_joints_only_where_both_ends_tell_them(robot):
         "mixed": motions((ends[0].vertices, poses.vertices), ends[0], poses)[0],
     }
     assert isinstance(found["joints"], LinkMotion) and isinstance(found["mixed"], ScrewMotion)
-    anew = frame(other, 2, 0.3)  # a description that came anew: another body
-    assert not isinstance(motions((ends[0].vertices, anew.vertices), ends[0], anew)[0], LinkMotion)
+    fresh = frame(other, 2, 0.3)  # a description that came again: another body
+    assert not isinstance(motions((ends[0].vertices, fresh.vertices), ends[0], fresh)[0], LinkMotion)
 
 
 def test_links_of_one_robot_share_what_is_computed_of_its_joints(robot):

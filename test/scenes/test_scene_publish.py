@@ -199,7 +199,7 @@ def test_node_reports_the_contacts_of_a_scene(name, size, listen, children, tmp_
 
     expected = {}
     for before, frame in zip(scene.frames(), list(scene.frames())[1:], strict=False):
-        if not frame.topologies:  # the node begins anew with a new topology
+        if not frame.topologies:  # the node begins again with a new topology
             detector = hpccd_core.Detector(scenes.core_scene(scene, frame.index))
             expected[frame.index] = detector.detect(before.stacked(), frame.stacked())
     assert sum(len(c) for c in expected.values()) > 100

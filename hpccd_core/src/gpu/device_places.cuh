@@ -14,8 +14,8 @@ namespace hpccd::gpu {
 class DevicePlaces {
  public:
   // Computes outputs for the rows of a result; `to` must be large enough. Returns the rows that only integers can
-  // decide, which are not written; or nothing if they are so many that the host should compute all rows. Waits for the
-  // stream.
+  // decide, which are not written; or nothing if there are too many, and the host should compute all rows. Waits for
+  // the stream.
   template <class T>
   std::optional<std::vector<OpenRow>> find(const LaunchParams<T>& params, const FrameResult& r, const PlacesOut& to,
                                            const Stages& stages) {

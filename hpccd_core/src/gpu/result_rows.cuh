@@ -84,7 +84,7 @@ class RowsPool {
  public:
   explicit RowsPool(bool on_device) : on_device_(on_device) {}
 
-  // Null if so many host rows are held that page-locked memory would become scarce.
+  // Null if the host rows that are held would make page-locked memory scarce.
   std::shared_ptr<ResultRows> take() {
     for (const auto& rows : rows_)
       if (rows.use_count() == 1) return rows;

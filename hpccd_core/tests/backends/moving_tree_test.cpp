@@ -34,7 +34,7 @@ std::vector<double> pose(unsigned number, double shifted = 0) {
   return positions;
 }
 
-// As of so many worlds that there is no room for a tree each, unless the number says otherwise.
+// As for more worlds than there is room for trees, unless the number says otherwise.
 struct Trees {
   explicit Trees(std::size_t n_worlds = std::size_t{1} << 30) : budget(n_worlds) {}
   // A query of this world. Returns the number of the tree that served it.
@@ -120,10 +120,10 @@ TEST(MovingTree, WhereThereIsRoomEachWorldKeepsItsOwn) {
     EXPECT_EQ(trees.ask(c, pose(1, 0.5)), of_c);
     EXPECT_EQ(trees.ask(a, pose(1)), of_a);
   }
-  const auto anew = trees.ask(b, pose(1));  // worn out: another one of its own
-  EXPECT_NE(anew, of_b);
-  EXPECT_NE(anew, of_a);
-  EXPECT_EQ(trees.ask(b, pose(1)), anew);
+  const auto another = trees.ask(b, pose(1));  // worn out: another one of its own
+  EXPECT_NE(another, of_b);
+  EXPECT_NE(another, of_a);
+  EXPECT_EQ(trees.ask(b, pose(1)), another);
 }
 
 TEST(MovingTree, AlwaysItsOwn) {

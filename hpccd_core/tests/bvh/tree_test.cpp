@@ -179,7 +179,7 @@ TEST_F(RowsTest, OfWhatRestsComeWithAnotherKindOfBounds) {
   expect_rows();
 }
 
-// So many triangles that threads split the upper ranges together and that many nodes lie above the front.
+// Enough triangles that threads split the upper ranges together and that many nodes lie above the front.
 struct LargeTreeTest : Sheets {
   LargeTreeTest() : Sheets(120) {}
 
@@ -210,7 +210,7 @@ TEST_F(LargeTreeTest, IsBuiltAlikeByAnyNumberOfThreads) {
   }
 }
 
-// Above the front whoever comes second joins the boxes, so many rounds: each would show a box joined too early.
+// Above the front whoever comes second joins the boxes. Many rounds: each would show a box joined too early.
 TEST_F(LargeTreeTest, IsRefittedAlikeByAnyNumberOfThreads) {
   update(0, 0.1);
   Tree alone, shared;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is told of the nearest features of two meshes: which pairs of meshes are listed, and the points on both sides.
+// Results about the nearest features of two meshes: which pairs of meshes are listed, and the points on both sides.
 #include "contacts/gaps.h"
 
 #include <gtest/gtest.h>

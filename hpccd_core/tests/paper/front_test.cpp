@@ -81,8 +81,8 @@ TEST_F(FrontTest, AKeptFrontIsTheFrontOfATraversalFromTheRoot) {
     front = update(cut);
     const PairSet kept = as_set(front);
     const std::uint64_t tested = worker.counts[0].tested + worker.counts[1].tested;
-    const PairSet anew = as_set(update({{{0, 0}}}));
-    EXPECT_EQ(kept, anew) << "step " << step;
+    const PairSet rebuilt = as_set(update({{{0, 0}}}));
+    EXPECT_EQ(kept, rebuilt) << "step " << step;
     EXPECT_EQ(tested, worker.counts[0].tested + worker.counts[1].tested);
   }
   EXPECT_GT(counts.ascended, 0u);

@@ -87,7 +87,7 @@ TEST_F(UpkeepTest, WithoutRestructuringTheOrderStays) {
 }
 
 TEST_F(UpkeepTest, RestructuringMendsTheCulling) {
-  double mended = 0, worn = 0;
+  double restructured = 0, worn = 0;
   for (const bool restructure : {true, false}) {
     Upkeep upkeep(features, restructure);
     for (int step = 0; step < 12; ++step) {
@@ -98,9 +98,9 @@ TEST_F(UpkeepTest, RestructuringMendsTheCulling) {
     }
     double area = 0;
     for (const Node& n : upkeep.hierarchy().nodes) area += n.box.half_area();
-    (restructure ? mended : worn) = area;
+    (restructure ? restructured : worn) = area;
   }
-  EXPECT_LT(mended, 0.8 * worn);
+  EXPECT_LT(restructured, 0.8 * worn);
 }
 
 TEST_F(UpkeepTest, AnInterruptedStepIsFollowedByANewHierarchy) {

@@ -28,7 +28,7 @@ TOC_SHADES = 33
 
 
 class RecordingPage:
-    """Collects steps, computed with outputs=("points",). every: those that are shown, each so many-th."""
+    """Collects steps, computed with outputs=("points",). every: each N-th step is shown."""
 
     def __init__(self, replay: Replay, mesh_names, title: str, *, every=1, azimuth=-60.0, elevation=26.0):
         self._replay = replay
@@ -154,7 +154,7 @@ class RecordingPage:
             (self._missing, "could not be computed: their contacts are not shown"),
             (self._differ, "were recorded with other contacts than those computed again, which are shown"),
             (self._truncated, "had their recorded answer truncated (max_contacts); all contacts were computed again"),
-            (self._cut, f"have more than {MOST:,} contacts, of which so many are drawn"),
+            (self._cut, f"have more than {MOST:,} contacts; only these are drawn"),
         ):
             if count:
                 notes.append(f"{count:,} of {_count(len(self._steps), 'step')} {what}.")

@@ -138,10 +138,10 @@ TEST_P(SearchLanes, WhatIsKnownToBeFreeNeedNotBeAskedAgain) {
     UndecidedPair pair{GetParam(), {}, {}, pairs.separations[i]};
     pair_positions(pairs.geometry(), GetParam(), pairs.first[i], pairs.second[i], pair.t0, pair.t1);
     FallbackCounts counts;
-    const auto anew = decide_separation(Accuracy::exact, pair, counts);
+    const auto fresh = decide_separation(Accuracy::exact, pair, counts);
     pair.apart_until = found->apart_until[k];
     told += pair.apart_until > 0;
-    EXPECT_EQ(decide_separation(Accuracy::exact, pair, counts), anew);
+    EXPECT_EQ(decide_separation(Accuracy::exact, pair, counts), fresh);
   }
   EXPECT_GT(told, 5);
 }
