@@ -84,7 +84,8 @@ class _Walk:
         if result.orphans:
             self._note(f"{result.orphans} messages of channels that nothing describes")
         if result.finished and data_end != result.readable:
-            index_problem = index_problem or f"the data ends at byte {result.readable:,}, the footer says {data_end:,}"
+            why = f"the data ends at byte {result.readable:,}, but according to the footer at {data_end:,}"
+            index_problem = index_problem or why
         if result.finished and index_problem:
             self._note(index_problem)
             result.finished = False
@@ -107,7 +108,7 @@ class _Walk:
     def _records_of(self, raw):
         result = self.result
         if raw.at == len(MCAP0_MAGIC) and raw.opcode != Opcode.HEADER:
-            self._note("no header at its begin")
+            self._note("no header at the beginning")
         if raw.at != len(MCAP0_MAGIC) and raw.opcode == Opcode.HEADER:
             self._note(f"a header at byte {raw.at:,}")
         try:
@@ -117,7 +118,7 @@ class _Walk:
                 result.compression = record.compression if record.compression in COMPRESSIONS else "none"
                 for item in inside(record):
                     if not within_chunk_times(record, item):
-                        self._note(f"the chunk at byte {raw.at:,} has a message outside of the times that it tells")
+                        self._note(f"the chunk at byte {raw.at:,} has a message outside of its times")
                     yield item
             elif record is not None:
                 yield record

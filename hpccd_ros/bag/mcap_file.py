@@ -63,7 +63,7 @@ class McapFile:
         index, begin = read_index(stream, size)
         end = places[-1].at + places[-1].length
         if begin != end:
-            raise McapError(f"the data ends at byte {end:,}, the footer says {begin:,}")
+            raise McapError(f"the data ends at byte {end:,}, but according to the footer at {begin:,}")
         self._index = index or Summary()
         if why := misplaced(self._index, places):
             raise McapError(why)
@@ -134,7 +134,7 @@ class McapFile:
 
     def _sort_in(self, raw: Raw) -> Place:
         if (raw.opcode == Opcode.HEADER) != (self.header is None):
-            raise McapError("no header at its begin" if self.header is None else "a second header")
+            raise McapError("no header at the beginning" if self.header is None else "a second header")
         if raw.opcode == Opcode.CHUNK:
             chunk = parse(raw)
             self.compression = self.compression or chunk.compression
@@ -161,7 +161,7 @@ class McapFile:
             return
         for item in inside(record):
             if not within_chunk_times(record, item):
-                raise McapError(f"the chunk at byte {place.at:,} has a message outside of the times that it tells")
+                raise McapError(f"the chunk at byte {place.at:,} has a message outside of its times")
             yield item
 
 

@@ -135,6 +135,6 @@ def miscounted(summary: Summary, counts: dict[int, int]) -> str | None:
         return None
     where = next((n for n in {**indexed, **counts} if indexed.get(n, 0) != counts.get(n, 0)), None)
     if where is None:
-        return f"the index lists {summary.statistics.message_count:,} messages, the file holds {sum(counts.values()):,}"
+        return f"the index lists {summary.statistics.message_count:,} messages, the file has {sum(counts.values()):,}"
     listed = f"{indexed.get(where, 0):,} messages of channel {where}"
-    return f"the index lists {listed}, the file holds {counts.get(where, 0):,}"
+    return f"the index lists {listed}, the file has {counts.get(where, 0):,}"

@@ -21,7 +21,7 @@ def recover(source, target, compression=None) -> Examination:
     source, target = Path(source), Path(target)
     first = examine(source)
     if first.message_count == 0:
-        raise RecordingError(f"{source} holds no whole message ({first.problem or 'an empty recording'})")
+        raise RecordingError(f"{source} has no complete message ({first.problem or 'an empty recording'})")
     with whole_file(target) as draft:
         with CopiedFile(
             draft,

@@ -197,7 +197,7 @@ class FrameAssembler:
         lost = state.early.popleft()
         version = "" if lost.version is None else f" version {lost.version}"
         text = (
-            f"topology{version} has not come; publish it on "
+            f"topology{version} has not arrived; publish it on "
             f"meshes/{state.name}/topology (reliable, transient local) before the vertices"
         )
         return [Refusal(state.name, Reason.NO_TOPOLOGY, text, sent=lost.sent)]

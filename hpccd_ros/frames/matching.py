@@ -14,7 +14,7 @@ from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.frames.types import MeshFrame
 
 # For missing frames that no publisher sends, so their stamps cannot be wrong.
-_MOVED = "descriptions, joint states or transforms for that stamp did not come in time: /diagnostics tells which"
+_MOVED = "descriptions, joint states or transforms for that stamp did not arrive in time; /diagnostics names them"
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ class NearestMatcher:
         matches, refusals = self._advance()
         if len(queue) > self._max_pending:
             if mesh == self._reference:
-                text = f"stamp {queue.popleft().stamp} ns waited in vain for the other meshes"
+                text = f"stamp {queue.popleft().stamp} ns got no frames of the other meshes"
                 refusals.append(Refusal(mesh, Reason.INCOMPLETE, text))
             else:
                 refusals += self._discard(mesh)
@@ -165,7 +165,8 @@ class NearestMatcher:
         if id(frame) in self._used:
             self._used.remove(id(frame))
             return []
-        return [Refusal(mesh, Reason.INCOMPLETE, f"stamp {frame.stamp} ns is the nearest of no other frame")]
+        text = f"stamp {frame.stamp} ns is not the nearest to a frame of the first mesh"
+        return [Refusal(mesh, Reason.INCOMPLETE, text)]
 
     def take(self, meshes: Collection[str]) -> list[tuple[str, MeshFrame]]:
         taken = []

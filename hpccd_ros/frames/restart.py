@@ -54,7 +54,7 @@ class StampOrder:
             text = f"stamp {stamp} ns came before; each frame needs a later stamp than the one before"
             return Refusal(self._mesh, Reason.REPEATED, text)
         if 0 < restart_after <= self._backward.next(stamp) or from_new_publisher:
-            return Restart(f"mesh {self._mesh} goes on from stamp {stamp} ns after {last} ns")
+            return Restart(f"mesh {self._mesh} continues from stamp {stamp} ns after {last} ns")
         return Refusal(self._mesh, Reason.BACKWARD, f"stamp {stamp} ns is before the last one, {last} ns")
 
 
@@ -99,7 +99,7 @@ class CoordinateFrame:
                 run = IncreasingStamps()
             self._elsewhere[mesh] = frame.frame_id, run
             if 0 < restart_after <= run.next(frame.stamp) or from_new_publisher:
-                return Restart(f"mesh {mesh} goes on in frame {quoted(frame.frame_id)} after {quoted(self.name)}")
+                return Restart(f"mesh {mesh} continues in frame {quoted(frame.frame_id)} after {quoted(self.name)}")
         return self._refuse(mesh, frame)
 
     def check_static(self, mesh: str, frame: MeshFrame) -> Refusal | None:

@@ -54,7 +54,7 @@ class _Edge(Samples[Rigid]):
             return self.samples[at], OUTDATED if self.outdated else self.sent[at]
         if self.in_doubt(stamp):
             ahead = f"the last one from {child!r} to {self.parent!r} is of {self.stamps[-1]} ns"
-            text = f"{ahead}, far ahead of the stamp {stamp} ns and of all before: the next one tells whether it counts"
+            text = f"{ahead}, far ahead of the stamp {stamp} ns and of all before; the next one decides if it is valid"
             raise NoTransformError(text, final=False)
         if at == 0:
             early = f"the first one kept from {child!r} to {self.parent!r} is of {self.stamps[0]} ns"
@@ -93,7 +93,7 @@ class TransformBuffer:
             raise ValueError(f"frames {parent!r} and {child!r}: two different names are needed")
         edge = self._edges.get(child)
         if edge is None and len(self._edges) >= MOST_FRAMES:
-            raise ValueError(f"frame {child!r} is one too many: {MOST_FRAMES} are known already")
+            raise ValueError(f"frame {child!r} exceeds the limit of {MOST_FRAMES} frames")
         if edge is None or edge.parent != parent:
             edge = self._edges[child] = _Edge(parent)
         if stamp is None:

@@ -129,7 +129,7 @@ class MeshTransformer:
     def _wrong_frame_id(self, frame: MeshFrame) -> str | None:
         if self._frame and frame.frame_id not in ("", self._frame):
             demanded = quoted(self._frame)
-            return f"frame_id {quoted(frame.frame_id)}, parameter mesh.{self._mesh}.frame demands {demanded}"
+            return f"frame_id {quoted(frame.frame_id)}, parameter mesh.{self._mesh}.frame requires {demanded}"
         if self._kind == "tf" and not (frame.frame_id or self._frame):
             what = "frame_id is empty: it must say what to transform from"
             return f"{what}; set it, or parameter mesh.{self._mesh}.frame"

@@ -147,7 +147,7 @@ def _report(bag, recorder, missing):
     for name, count in recorder.received.items():
         if count:
             lost = recorder.lost.get(name, 0)
-            print(f"  {name}: {count} messages" + (f", {lost} LOST on the way here" if lost else ""))
+            print(f"  {name}: {count} messages" + (f", {lost} LOST on the way to the recorder" if lost else ""))
     for text in missing:
         print(f"  {text}")
     files = bag.file_paths

@@ -111,7 +111,7 @@ def _not_any(recorded, contacts, layout) -> str | None:
     if bool(count) != bool(total):
         return _count(count, total)
     if recorded.total < count or (recorded.total > count and not recorded.truncated):
-        return f"{recorded.total:,} contacts are told of, {count:,} were recorded"
+        return f"{recorded.total:,} contacts in total, but {count:,} were recorded"
     first = min(recorded.toc, default=float("inf"))
     if recorded.first_toc != first:
         return f"first time of contact: recorded {recorded.first_toc!r}, that of the recorded contacts is {first!r}"

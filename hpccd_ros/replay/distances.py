@@ -118,7 +118,7 @@ class DistanceCheck:
         try:
             gaps = self._detector.distances(frame)
         except CORE_ERRORS as error:
-            self._lacks(f"distances at {stamp} ns: the core refuses it: {error}")
+            self._lacks(f"distances at {stamp} ns: the core rejects it: {error}")
             return
         expected = type(answer)()
         fill_distances(expected, gaps, Layout.of(self._detector.mesh_names, frame.topologies))

@@ -28,7 +28,7 @@ def main(args) -> int:
         _read(args.file)
         return 0
     if not any(e.message_count for e in examinations):
-        raise UserError(f"{args.file} holds no whole message: no recording, or nothing is left of it")
+        raise UserError(f"{args.file} has no complete message: it is not a recording, or nothing is left of it")
     return 1
 
 

@@ -7,7 +7,7 @@ import time
 def next_wanted(where: str) -> bool:
     """Wait for Enter; False at the end of the input (Ctrl-D)."""
     try:
-        input(f"{where}: Enter goes on to the next frame, Ctrl-D ends ")
+        input(f"{where}: Enter continues with the next frame, Ctrl-D ends ")
     except EOFError:
         return False
     return True

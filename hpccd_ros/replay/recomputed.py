@@ -320,7 +320,7 @@ class Replay:
         try:
             self._detector.prepare_scene(end)
         except CORE_ERRORS as error:
-            raise RecordingError(f"frame with stamp {end.stamp} ns: the core refuses it: {error}") from error
+            raise RecordingError(f"frame with stamp {end.stamp} ns: the core rejects it: {error}") from error
         try:
             self._detector.prepare_detector()
         except CORE_ERRORS as error:
@@ -328,7 +328,7 @@ class Replay:
         try:
             found = self._detector.detect(step.start_frame, end)
         except CORE_ERRORS as error:
-            step.missing = f"the core refuses it: {error}"  # as in the node, which continues with the next one
+            step.missing = f"the core rejects it: {error}"  # as in the node, which continues with the next one
             return
         step.contacts, step.layout, step.milliseconds = found.contacts, found.layout, found.detect_ms
         step.bounds = found.bounds

@@ -99,14 +99,14 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
     by_transforms = any(row["input"] == topic_names.BY_TRANSFORMS for row in meshes.values())
     if not by_transforms and not of_robots and not any(kind in topic_names.POSITIONS for _, kind in roles.values()):
         raise RecordingError(
-            f"{recording.path} holds no vertices of the meshes {', '.join(meshes)}; its topics are "
+            f"{recording.path} has no vertices of the meshes {', '.join(meshes)}; its topics are "
             f"{', '.join(recording.topics) or 'none'}"
         )
     moved = [f"mesh.{name}.{key}" for name, row in meshes.items() for key in ("transform", "input") if row[key] == "tf"]
     moved += [f"robot.{name}" for name in of_robots if robot_parameters.need_transforms({name: of_robots[name]})]
     if moved and not any(kind in transform_topics.ALL for _, kind in roles.values()):
         raise RecordingError(
-            f"{recording.path}: a mesh was moved by transforms (parameter {moved[0]}), and the recording holds none: "
+            f"{recording.path}: a mesh was moved by transforms (parameter {moved[0]}), and the recording has none: "
             "its positions cannot be computed again"
         )
     for topic in joint_topics:
@@ -137,7 +137,7 @@ def _stored(recording, info) -> dict:
     stored = info.get("parameters", {})
     if stored == {}:
         raise RecordingError(
-            f"{recording.path} was not written by `hpccd record`: it does not hold the node's parameters. Give "
+            f"{recording.path} was not written by `hpccd record`: it does not contain the node's parameters. Give "
             "them with --params FILE (the YAML file that the node was started with)"
         )
     if not isinstance(stored, dict):

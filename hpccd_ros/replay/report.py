@@ -273,7 +273,7 @@ class Summary:
         elif replay.recorded_answers:
             print("NOTHING VERIFIED: the recording has answers, but not the frames that they belong to")
         elif self.computed:
-            print("computed only: the recording holds no contacts to compare with")
+            print("computed only: the recording has no contacts to compare with")
         else:
             print("NOTHING COMPUTED: no two frames of all meshes follow each other in the recording")
         sys.stdout.flush()

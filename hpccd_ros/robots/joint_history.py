@@ -130,7 +130,7 @@ class JointHistory:
         if doubtful := [name for name, values in self._joints.items() if values.in_doubt(stamp)]:
             last = self._joints[doubtful[0]].stamps[-1]
             text = f"the last position of {listed(doubtful)} is of {last} ns, far ahead of the stamp {stamp} ns"
-            raise NoJointStateError(f"{text} and of all before: the next one tells whether it counts", final=False)
+            raise NoJointStateError(f"{text} and of all before; the next one decides if it is valid", final=False)
         return {name: values.at(stamp) for name, values in self._joints.items()}
 
     def sent_at(self, stamp: int) -> int:

@@ -103,7 +103,7 @@ class Robot:
                 meshes.append(RobotMesh(names[link.name], link.name, topology, Body.of(vertices)))
         if not meshes:
             other = next(kind for kind in urdf.GEOMETRIES if kind != geometry)
-            raise RobotError(f"geometry: no link has <{geometry}>, so nothing could touch; try {other}")
+            raise RobotError(f"geometry: no link has <{geometry}>, so the robot has no meshes; try {other}")
         _check_reach(description, meshes)
         semantics = None if srdf_text is None else srdf.parse(srdf_text, (link.name for link in description.links))
         ignored = srdf.ignored(description, semantics)
@@ -183,6 +183,6 @@ def _check_reach(description: urdf.Description, meshes: list[RobotMesh]) -> None
     reach = offsets + max(mesh.body.radius for mesh in meshes)
     if not reach <= LARGEST_OF_POSES:
         raise RobotError(
-            f"{urdf.DOCUMENT}: stretched out the robot would reach {reach:g}, and {LARGEST_OF_POSES:g} is the most; "
+            f"{urdf.DOCUMENT}: fully stretched, the robot would reach {reach:g}, and {LARGEST_OF_POSES:g} is the most; "
             "fix the origins of joints or the sizes of links"
         )

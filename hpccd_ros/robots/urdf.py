@@ -117,8 +117,8 @@ def _joint(element: Element, links: dict[str, Link]) -> RobotJoint:
     name, kind = _name(element), element.text("type")
     if kind in ("floating", "planar"):
         raise element.error(
-            f"is {kind}, which no single value moves; remove it where it only says where the robot stands, and let TF "
-            "or the base's pose say that"
+            f"is {kind}, which no single value moves; if it only places the robot, remove it, and place the base by TF "
+            "or by its pose"
         )
     if kind not in KINDS:
         raise element.error(f"has the type {quoted(kind)}; choose from {', '.join(KINDS)}")
@@ -126,7 +126,7 @@ def _joint(element: Element, links: dict[str, Link]) -> RobotJoint:
     for tag in ("parent", "child"):
         end = element.needed(tag).text("link")
         if end not in links:
-            raise element.error(f"has the {tag} {quoted(end)}, and no link is called so; links are {listed(links)}")
+            raise element.error(f"has the {tag} {quoted(end)}, which is not a link; links are {listed(links)}")
         ends.append(end)
     if ends[0] == ends[1]:
         raise element.error("has one link as parent and child; name two")
@@ -175,7 +175,7 @@ def _check_mimics(robot: Element, joints: dict[str, RobotJoint]) -> None:
         while at.mimic is not None:
             followed = joints.get(at.mimic.joint)
             if followed is None or followed.kind == "fixed":
-                why = "no joint is called so" if followed is None else "it does not move"
+                why = "there is no such joint" if followed is None else "it does not move"
                 raise robot.error(f"has the joint {quoted(at.name)}, which mimics {quoted(at.mimic.joint)}: {why}")
             if followed.name in passed:
                 raise robot.error(f"has joints that mimic each other in a circle: {listed([*passed, followed.name])}")
@@ -211,7 +211,7 @@ def _placed(element: Element) -> Placed:
         raise geometry.error(f"has {len(geometry.children)} shapes; it needs one: {', '.join(_SHAPES)}")
     (shape,) = geometry.children
     if shape.tag not in _SHAPES:
-        raise shape.error(f"is no known shape; choose from {', '.join(_SHAPES)}")
+        raise shape.error(f"is not a known shape; choose from {', '.join(_SHAPES)}")
     return Placed(_SHAPES[shape.tag](shape), _origin(element), element.line)
 
 

@@ -95,7 +95,7 @@ def test_sound_files_are_called_sound(tmp_path):
 def test_nothing_to_recover(tmp_path):
     path = tmp_path / "bag.mcap"
     write_texts(path, [])
-    with pytest.raises(RecordingError, match="no whole message"):
+    with pytest.raises(RecordingError, match="no complete message"):
         recover(path, tmp_path / "saved.mcap")
     assert not (tmp_path / "saved.mcap").exists()
 
@@ -120,4 +120,4 @@ def test_what_holds_nothing_to_save_is_unusable(hpccd, tmp_path, content):
     (tmp_path / "x.mcap").write_bytes(content)
     for options in ((), ("--recover", "saved.mcap")):
         done = hpccd("doctor", "x.mcap", *options)
-        assert done.returncode == 2 and done.stderr.startswith("hpccd doctor: x.mcap holds no whole message"), done
+        assert done.returncode == 2 and done.stderr.startswith("hpccd doctor: x.mcap has no complete message"), done

@@ -102,7 +102,7 @@ def test_a_topic_without_a_name_is_not_that_of_the_answers(bag, tmp_path):
     bag.channel("/contacts").topic = ""
     replayed = hpccd("replay", bag.write(tmp_path / "x.mcap"))
     assert replayed.status == 0 and "VERIFIED:" not in replayed.out
-    assert "the recording holds no contacts" in replayed.out
+    assert "the recording has no contacts" in replayed.out
 
 
 @pytest.mark.parametrize("body", [b"", struct.pack("<HI", 1, 16), struct.pack("<HI", 1, 15) + bytes(15)])
@@ -165,7 +165,7 @@ def test_an_index_that_tells_of_fewer_messages(bag, tmp_path):
         return records
 
     bag.index = _indexed(change)
-    _called_damaged(bag.write(tmp_path / "x.mcap"), "the index lists 0 messages of channel 5, the file holds 7")
+    _called_damaged(bag.write(tmp_path / "x.mcap"), "the index lists 0 messages of channel 5, the file has 7")
 
 
 def test_a_footer_that_points_elsewhere(bag, tmp_path):
@@ -211,7 +211,7 @@ def test_messages_of_no_channel(bag, tmp_path):
 def test_times_of_a_chunk_that_are_not_those_of_its_messages(bag, tmp_path):
     """By them chunks are put into order."""
     bag.chunk = lambda chunk: dataclasses.replace(chunk, message_start_time=chunk.message_end_time)
-    _called_damaged(bag.write(tmp_path / "x.mcap"), "outside of the times that it tells")
+    _called_damaged(bag.write(tmp_path / "x.mcap"), "outside of its times")
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
@@ -253,7 +253,7 @@ def test_sizes_of_attachments(bag, tmp_path, size):
 
 def test_a_file_without_its_header(bag, tmp_path):
     bag.data = lambda records: records[1:]
-    _called_damaged(bag.write(tmp_path / "x.mcap"), "no header at its begin")
+    _called_damaged(bag.write(tmp_path / "x.mcap"), "no header at the beginning")
 
 
 def test_a_full_disk_is_no_damage(sound_bags, tmp_path):

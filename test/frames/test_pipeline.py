@@ -85,7 +85,7 @@ def test_a_restart_is_told():
     outcomes = [pipeline.push("cloth", frame(stamp)) for stamp in (100, 1, 2)]
     assert [stamps(outcome.frames) for outcome in outcomes] == [[100], [], [2]]
     assert reasons(outcomes[1]) == [("cloth", "stamp_backward")]
-    assert outcomes[2].restarts == ["mesh cloth goes on from stamp 2 ns after 100 ns: taken as a restart"]
+    assert outcomes[2].restarts == ["mesh cloth continues from stamp 2 ns after 100 ns: taken as a restart"]
     pipeline.set_restart_after(0)
     assert not any(pipeline.push("cloth", frame(1)).restarts for _ in range(9))
 

@@ -37,7 +37,7 @@ def test_pose_of_a_stream(start_node):
     check(node.contacts(1)[0], 1)
     node.peer.vertices("net", parts(2)[2], 2 * SECOND, frame_id="foot")
     values = node.frames_status(dropped__net__frame_id=1)
-    assert "mesh.net.frame demands 'hand'" in values["last_refusal"]
+    assert "mesh.net.frame requires 'hand'" in values["last_refusal"]
 
 
 def test_pose_of_integers(start_node):

@@ -155,7 +155,7 @@ def test_the_core_finds_the_same_time_of_any_contact():
             ),
             "now not found",
         ),
-        (lambda put, answer: put("total", 1), "1 contacts are told of"),
+        (lambda put, answer: put("total", 1), "1 contacts in total"),
         (lambda put, answer: put("first_toc", 0.5), "first time of contact"),
         (_only([]), "0 contacts were recorded"),
         (lambda put, answer: put("kind", answer.kind[:-1]), "malformed"),

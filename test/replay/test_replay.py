@@ -247,7 +247,7 @@ def test_recording_of_another_recorder_needs_parameters(small_bag, tmp_path, hpc
     assert hpccd("replay", path, "--params", "node.yaml").returncode == 0
     (tmp_path / "other.yaml").write_text("/**:\n  ros__parameters:\n    meshes: [shirt]\n")
     wrong = hpccd("replay", path, "--params", "other.yaml")
-    assert wrong.returncode == 2 and "holds no vertices of the meshes shirt" in wrong.stderr
+    assert wrong.returncode == 2 and "has no vertices of the meshes shirt" in wrong.stderr
     (tmp_path / "bad.yaml").write_text("- a list")
     bad = hpccd("replay", path, "--params", "bad.yaml")
     assert bad.returncode == 2 and "no ROS parameter file" in bad.stderr

@@ -108,7 +108,7 @@ def test_vertices_placed_together_are_those_of_each_pose(base):
 
 def test_places_that_the_core_cannot_take_are_refused():
     for offset in ("1e200", "1e147"):
-        with pytest.raises(RobotError, match="stretched out the robot would reach 1.4"):
+        with pytest.raises(RobotError, match="fully stretched, the robot would reach 1.4"):
             Robot.of(URDF.replace('xyz="0 0 1"/></joint></robot>', f'xyz="{offset} {offset} 0"/></joint></robot>'))
     robot = Robot.of(URDF)
     state = robot.kinematics.state({"turn": 0.0, "slide": 0.0, "roll": 0.0}, Rigid.of((0, 2e147, 0), (0, 0, 0, 1)))
@@ -124,7 +124,7 @@ def test_the_finer_the_tolerance_the_more_triangles():
 @pytest.mark.parametrize(
     "arguments, message",
     [
-        ({"geometry": "visual"}, "geometry: no link has <visual>, so nothing could touch; try collision"),
+        ({"geometry": "visual"}, "geometry: no link has <visual>, so the robot has no meshes; try collision"),
         ({"geometry": "both"}, "geometry: 'both'"),
         ({"urdf_text": URDF.replace(' name="swing"', "")}, "name: the description has none; give one"),
         ({"srdf_text": SRDF.replace("link2", "link3")}, "SRDF, line 1: <disable_collisions> needs the attribute link2"),
