@@ -27,7 +27,7 @@ COMMANDS = {
     "info": "what is installed here: versions, backends, processor",
 }
 
-# Those that load rcl whatever their options.
+# Commands that always load rcl.
 NEED_ROS = ("cut", "demo", "echo", "param", "record", "replay", "status", "view")
 
 EPILOG = """\
@@ -70,7 +70,7 @@ def main(argv=None) -> int:
 
 
 class _Interrupts:
-    """Python's own answer to SIGINT, which also remembers that it came; nothing where SIGINT is not left to Python."""
+    """Python's handler of SIGINT, which also records the signal; no change if SIGINT is not handled by Python."""
 
     def __init__(self):
         self.came = False

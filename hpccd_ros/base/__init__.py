@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every other package may use: errors, optional extras, version, how to quote what others sent. No ROS."""
+"""Shared by all packages: errors, optional extras, version, quoting of untrusted text. No ROS."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ages of messages: by the system clock, which dates them, checked against the steady clock, which is never set."""
+"""Ages of messages from the system clock, checked with the steady clock, which is never set."""
 
 import time
 from collections.abc import Callable
@@ -22,12 +22,13 @@ class Clocks:
 
 
 class ClockWatch:
-    """Whether the ages of messages can be trusted. They cannot after a jump of the system clock against the steady one,
-    or a message from the future, by more than ``error`` s in either case, until both have agreed for ``wait`` s.
+    """Whether the ages of messages can be trusted. Ages are untrusted after a jump of the system clock relative to the
+    steady one, or after a message from the future, by more than ``error`` s, until both clocks have agreed for ``wait``
+    s.
 
-    A message sent by a clock that is set back afterwards seems younger than it is, by as much. So the wait is longer by
-    that, up to 10 s: after it, such a message seems older than ``wait``. Messages received during the wait never count.
-    Not thread-safe.
+    If a clock is set back after it dated a message, the message seems younger by this amount. So the wait is longer by
+    this amount, up to 10 s; then such a message seems older than ``wait``. Messages received during the wait never
+    count. Not thread-safe.
     """
 
     def __init__(self, error: float, wait: float) -> None:
@@ -60,7 +61,7 @@ class ClockWatch:
         return True
 
     def why(self, steady: float) -> str:
-        """Why ages cannot be trusted; "": they can."""
+        """Why ages are untrusted; "" if they are trusted."""
         return self._text if steady < self._until else ""
 
     def _doubt(self, steady: float, younger: float, text: str) -> None:

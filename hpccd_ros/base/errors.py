@@ -3,4 +3,4 @@
 
 
 class UserError(Exception):
-    """What went wrong and what to do about it, in words for the person who typed the command."""
+    """A problem and its remedy, as a sentence for the user of a command."""

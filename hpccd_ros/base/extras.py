@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Optional dependencies: an error that names the extra of the package where one is missing."""
+"""Optional dependencies: if one is missing, the error names the extra that contains it."""
 
 import importlib
 
@@ -7,7 +7,7 @@ from hpccd_ros.base.errors import UserError
 
 
 def require(module: str, extra: str, purpose: str):
-    """The imported `module`. Raises UserError where it is not installed, with what brings it."""
+    """Import `module`. Raises UserError with the remedy if it is not installed."""
     try:
         return importlib.import_module(module)
     except ModuleNotFoundError as error:

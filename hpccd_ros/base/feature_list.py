@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An argument of commands that names what is tested."""
+"""The argument of commands for the tested features."""
 
 import argparse
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write a file so that its name never holds half of it."""
+"""Write a file atomically: its name never refers to a partial file."""
 
 import contextlib
 import errno

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`hpccd demo`: everything once, as separate processes over DDS."""
+"""`hpccd demo`: node, publisher and recorder as processes over DDS."""

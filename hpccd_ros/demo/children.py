@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Child processes that never outlive their parent: ended in reverse order, gently first."""
+"""Child processes that end with their parent, in reverse order: by SIGINT, then by SIGKILL."""
 
 import ctypes
 import dataclasses
@@ -66,7 +66,7 @@ class Children:
         return child
 
     def check(self) -> None:
-        """Raise UserError with the last words of a child that has failed."""
+        """Raise UserError with the last output of a child that has failed."""
         for child in self._all:
             if not child.running and child.process.returncode != 0:
                 raise UserError(
@@ -75,7 +75,7 @@ class Children:
                 )
 
     def wait(self, ready, what: str, timeout: float) -> None:
-        """Wait until `ready()`; raise UserError where a child fails or `timeout` seconds pass."""
+        """Wait until `ready()`; raise UserError if a child fails or `timeout` seconds pass."""
         deadline = time.monotonic() + timeout
         while not ready():
             self.check()
@@ -85,7 +85,7 @@ class Children:
             time.sleep(0.05)
 
     def end(self, child: Child) -> int:
-        """SIGINT, and SIGKILL where that does not help; returns the exit status."""
+        """Send SIGINT, then SIGKILL if the child does not end; returns the exit status."""
         if child.running:
             child.process.send_signal(signal.SIGINT)
             try:
@@ -95,7 +95,7 @@ class Children:
         return child.process.wait()
 
     def forget(self, child: Child) -> None:
-        """Leave a child that has ended out of `check`."""
+        """Ignore a child that has ended in `check`."""
         self._all.remove(child)
 
 

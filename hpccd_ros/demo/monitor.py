@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the demo shows while it runs, heard over DDS like any other listener would."""
+"""The status that the demo shows while it runs, received over DDS."""
 
 import time
 from collections import Counter
@@ -51,7 +51,7 @@ class Monitor:
         rclpy.try_shutdown()
 
     def nodes_called(self, name: str) -> bool:
-        """Whether a node with this full name is in the network."""
+        """Whether the graph contains a node with this full name."""
         return any(f"{ns.rstrip('/')}/{n}" == name for n, ns in self._node.get_node_names_and_namespaces())
 
     def receives_contacts(self) -> bool:
@@ -59,7 +59,7 @@ class Monitor:
         return self._contacts.get_publisher_count() > 0
 
     def listen(self, seconds: float) -> None:
-        """Take what comes within `seconds`."""
+        """Spin for `seconds`."""
         end = time.monotonic() + seconds
         with stop_signals.later():
             while (left := end - time.monotonic()) > 0:

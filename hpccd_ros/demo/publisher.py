@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The demo's publisher: plays a scene like `hpccd scene --publish`, but no faster than node and recorder follow.
+"""The demo's publisher: plays a scene like `hpccd scene --publish`, but waits for node and recorder.
 
 `python -m hpccd_ros.demo.publisher SCENE SIZE FRAMES RATE`
 """
