@@ -13,7 +13,7 @@ from visualization_msgs.msg import Marker
 from hpccd_ros.frames.drops import Input
 from hpccd_ros.frames.types import MeshFrame, PoseFrame, Topology
 from hpccd_ros.frames.welding import Welding
-from hpccd_ros.middleware import fields, mesh_messages, whole_meshes
+from hpccd_ros.middleware import fields, mesh_messages, message_types, whole_meshes
 from hpccd_ros.middleware.topic_names import MARKER, POINTS, POSE, POSITIONS, SHAPE, TOPOLOGY, VERTICES, WHOLE
 
 TYPES = {
@@ -23,6 +23,14 @@ TYPES = {
     SHAPE: Mesh,
     MARKER: Marker,
     POSE: PoseStamped,
+}
+TYPE_NAMES = {
+    TOPOLOGY: message_types.TOPOLOGY,
+    VERTICES: message_types.VERTICES,
+    POINTS: message_types.POINTS,
+    SHAPE: message_types.SHAPE,
+    MARKER: message_types.MARKER,
+    POSE: message_types.POSE,
 }
 INPUTS = {TOPOLOGY: Input.TOPOLOGY} | dict.fromkeys(POSITIONS, Input.VERTICES)
 

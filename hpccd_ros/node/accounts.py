@@ -22,7 +22,8 @@ class Accounts:
     """``dropped``: vertex messages. ``connections``: reports of the middleware about topics (name -> count).
 
     ``static_taken``: accepted messages of static meshes, which count as answered. ``requests``: to ~/detect, service
-    and action, by how they ended. ``inputs``: those taken since the node was configured. warn: logs a text.
+    and action, by how they ended. ``inputs``: those taken since the node was configured. ``heard``: topics
+    (relative names) of closed subscriptions that had a message since then. warn: logs a text.
     on_refused: called with each refusal, in the thread that refuses. on_received: called with each input message: its
     kind, its mesh or topic, and the middleware's info about it.
     """
@@ -37,6 +38,7 @@ class Accounts:
         self.requests = Counter(answered=0, refused=0, busy=0, timed_out=0, failed=0, stopped=0, canceled=0)
         self.restarts = 0
         self.static_taken = 0
+        self.heard: set[str] = set()
         self.inputs = TakenInputs()
         self.on_refused: Callable[[Refusal], None] = lambda refusal: None
         self.on_received: Callable[[str, str, dict[str, Any]], None] = lambda kind, name, info: None

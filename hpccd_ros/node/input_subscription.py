@@ -11,11 +11,11 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from hpccd_ros.base.quoting import shortened
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.types import Outcome
-from hpccd_ros.middleware import qos_overrides
+from hpccd_ros.middleware import graph, qos_overrides
 from hpccd_ros.node.accounts import Accounts
+from hpccd_ros.node.silence import QUIET
 
 # Bounds the publishers reported for one topic at a time: any process may start some.
 MOST_REPORTED = 3
@@ -49,8 +49,6 @@ class InputSubscription:
             if counts is not None:
                 counts[f"qos_incompatible.{topic}"] += event.total_count_change
             self._any_unconnected = True
-            for line in self.warnings() or [f"{self.topic}: a publisher offers less than the node requests"]:
-                node.get_logger().warning(line)
 
         self.subscription = qos_overrides.create_subscription(
             node,
@@ -86,6 +84,24 @@ class InputSubscription:
         more = len(lines) - MOST_REPORTED
         return [*lines[:MOST_REPORTED], *([f"{self.topic}: {more} more such publishers"] if more > 0 else [])]
 
+    def why_silent(self, type_name: str) -> str:
+        """Why no message comes, in words, and the remedy; "": `warnings` says it. type_name: of its messages."""
+        found = self._node.get_publishers_info_by_topic(self.topic)
+        if not found:
+            return f"{self.topic}: it has no publisher; start one, or let it publish on this topic"
+        of_type = [publisher for publisher in found if publisher.topic_type == type_name]
+        if not of_type:
+            return (
+                f"{self.topic}: a publisher {graph.endpoint_node(found[0])} sends {found[0].topic_type}, and the node "
+                f"expects {type_name}; publish this type, or use another topic"
+            )
+        if all(self._why_unconnected(publisher) for publisher in of_type):
+            return ""
+        return (
+            f"{self.topic}: no message for {QUIET:g} s from its publisher {graph.endpoint_node(of_type[0])}; check "
+            "that it still publishes"
+        )
+
     def _why_unconnected(self, publisher: Any) -> str:
         """Why a publisher is not connected, and the remedy; "": it is."""
         offered, asked = publisher.qos_profile, self.subscription.qos_profile
@@ -103,8 +119,8 @@ class InputSubscription:
         elif len(less) == 1:
             remedy += " (latched): otherwise messages sent before the node listened would be missing"
         return (
-            f"{self.topic}: a publisher {_node_of(publisher)} offers {offers} but the node requests {asks}, so none "
-            f"of its messages are received; {remedy}"
+            f"{self.topic}: a publisher {graph.endpoint_node(publisher)} offers {offers} but the node requests {asks}, "
+            f"so none of its messages are received; {remedy}"
         )
 
     def _setting(self) -> str:
@@ -115,15 +131,6 @@ class InputSubscription:
 def unconnected(subscriptions: Iterable[InputSubscription]) -> list[str]:
     """The warnings of all subscriptions, each once."""
     return list(dict.fromkeys(line for subscription in subscriptions for line in subscription.warnings()))
-
-
-def _node_of(publisher: Any) -> str:
-    if publisher.node_name == "_NODE_NAME_UNKNOWN_":  # ROS discovers nodes after their publishers
-        return "whose node is not known yet"
-    if publisher.node_name == "_CREATED_BY_BARE_DDS_APP_":
-        return "that is not a ROS node"
-    name = f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
-    return f"of node {shortened(name)}"
 
 
 _YIELD = 2e-5  # s; what counts is that it is not 0

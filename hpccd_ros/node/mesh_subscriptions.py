@@ -2,7 +2,7 @@
 """Subscriptions to one mesh: its topology, and where it is."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,7 @@ from hpccd_ros.middleware import executors, mesh_inputs, qos, topic_names
 from hpccd_ros.middleware.fields import InvalidMessageError
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.input_subscription import InputSubscription, hand_over
+from hpccd_ros.node.silence import Silence
 
 UNREADABLE = "a message cannot be deserialised; build its publisher with the same definition of the message"
 
@@ -43,18 +44,20 @@ class MeshTopic:
         self.reception = reception
         self.kind = kind
         self.numbers = SequenceWatch()
+        self.received = 0  # messages
         self.sent = 0  # when the last message taken was sent
+        self._silence = Silence()
         self._limit = RateLimit(reception.settings["max_rate"])
         self._subscription: InputSubscription | None = None
-        self._topic = topic_names.of_mesh(reception.mesh, kind)
+        self.relative_name = topic_names.of_mesh(reception.mesh, kind)
 
     def taken(self, sent: int, new_publisher: bool, several: bool = False) -> None:
         """A message goes to the pipeline; sent: source timestamp, ns. several: the topic has several publishers."""
         flags = NEW_PUBLISHER * new_publisher + SEVERAL_PUBLISHERS * several
-        self.reception.accounts.inputs.add(self._topic, sent, flags)
+        self.reception.accounts.inputs.add(self.relative_name, sent, flags)
 
     def subscribe(self, callback: Callable[[Any, dict[str, Any]], None], profile: QoSProfile) -> Subscription:
-        topic = self._topic
+        topic = self.relative_name
         self._subscription = InputSubscription(
             self.reception.node,
             mesh_inputs.TYPES[self.kind],
@@ -69,12 +72,15 @@ class MeshTopic:
         return self._subscription.subscription
 
     def close(self) -> None:
+        if self.received:
+            self.reception.accounts.heard.add(self.relative_name)
         if self._subscription is not None:
             self._subscription.close()
             self._subscription = None
 
     def take(self, info: dict[str, Any]) -> None:
         """A message has been received, and its info."""
+        self.received += 1
         self.sent = info["source_timestamp"]
         self.reception.accounts.on_received(self.kind, self.reception.mesh, info)
 
@@ -91,6 +97,13 @@ class MeshTopic:
     def warnings(self) -> list[str]:
         """Publishers that are not connected."""
         return self._subscription.warnings() if self._subscription is not None else []
+
+    def silent(self) -> list[str]:
+        """Why nothing comes, where that has lasted."""
+        if self._subscription is None or not self._silence.lasts(self.received):
+            return []
+        why = self._subscription.why_silent(mesh_inputs.TYPE_NAMES[self.kind])
+        return [why] if why else []
 
     def too_fast(self) -> str | None:
         """In words, where a message came faster than the node looks at them."""
@@ -221,10 +234,17 @@ class PositionsSubscription(MeshTopic):
 
 
 class MeshSubscriptions:
-    """Subscribed from construction until ``close``. given_as: parameter mesh.NAME.input."""
+    """Subscribed from construction until ``close``. values: parameters mesh.NAME.*."""
 
-    def __init__(self, reception: Reception, given_as: str) -> None:
+    def __init__(self, reception: Reception, values: Mapping[str, Any]) -> None:
+        given_as = values["input"]
         self._reception = reception
+        self._by_file = bool(values["file"])
+        # Kinds of which one message is enough; the topology comes with each message of a whole mesh.
+        self._once = {topic_names.TOPOLOGY}
+        if given_as in (topic_names.POSE, topic_names.BY_TRANSFORMS) or values["static"]:
+            self._once |= {topic_names.VERTICES} if given_as != topic_names.POINTS else {topic_names.POINTS}
+        self._whole = given_as in topic_names.WHOLE
         self.topics: list[MeshTopic] = []
         self.topics.append(TopologySubscription(reception))
         self._positions = [PositionsSubscription(reception, kind) for kind in topic_names.positions(given_as)]
@@ -237,6 +257,19 @@ class MeshSubscriptions:
         for topic in self.topics:
             topic.close()
         self.topics.clear()
+
+    def silent(self) -> list[str]:
+        """Why messages that are needed do not come."""
+        return [line for topic in self.topics if self._needs(topic) for line in topic.silent()]
+
+    def _needs(self, topic: MeshTopic) -> bool:
+        """Whether a message must come: the next one, or the only one."""
+        of = self._reception
+        if topic.kind == topic_names.TOPOLOGY:
+            return not (self._whole or of.pipeline.topology(of.mesh))
+        if topic.kind not in self._once:
+            return True
+        return not (self._by_file or topic.received or topic.relative_name in of.accounts.heard)
 
     def warnings(self) -> list[str]:
         """What is odd about the publishers of the mesh."""

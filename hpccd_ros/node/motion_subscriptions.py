@@ -17,11 +17,12 @@ from hpccd_ros.base.clocks import Clocks
 from hpccd_ros.frames.arrivals import InterleavedSequences, RateLimit
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
-from hpccd_ros.middleware import executors, joint_messages, qos, transform_topics
+from hpccd_ros.middleware import executors, joint_messages, message_types, qos, transform_topics
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.middleware.transform_topics import TransformTopic
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.input_subscription import InputSubscription, hand_over, unconnected
+from hpccd_ros.node.joint_state_watch import JointStateWatch
 from hpccd_ros.node.mesh_subscriptions import UNREADABLE
 from hpccd_ros.params import robot_parameters
 from hpccd_ros.params.table import ROBOT
@@ -57,10 +58,13 @@ class JointSubscriptions:
         self._accounts = accounts
         topics = robot_parameters.joint_topics(settings[ROBOT])
         self._recent: dict[str, deque[_Recent]] = {topic: deque(maxlen=joint_messages.MOST_RECENT) for topic in topics}
+        self._watches = {topic: JointStateWatch(node.resolve_topic_name(topic)) for topic in topics}
+        self._watch(topics)
         self._subscriptions = [self._subscribe(topic, robots) for topic, robots in topics.items()]
 
     def use(self, pipeline: FramePipeline, by_joints: Mapping[str, JointFrames]) -> None:
         self._pipeline, self._of_robots = pipeline, by_joints
+        self._watch(robot_parameters.joint_topics(self._settings[ROBOT]))
         for topic, robots in robot_parameters.joint_topics(self._settings[ROBOT]).items():
             moved = [by_joints[robot] for robot in robots if robot in by_joints]
             for recent in self._recent[topic]:
@@ -75,9 +79,24 @@ class JointSubscriptions:
         self._subscriptions.clear()
 
     def warnings(self) -> list[str]:
-        """Topics without a publisher, and publishers that are not connected."""
+        """Topics without a publisher, publishers that are not connected, and joint states that move nothing."""
         silent = [subscription.topic for subscription in self._subscriptions if not subscription.publishers]
-        return [f"nobody publishes {topic}" for topic in silent] + unconnected(self._subscriptions)
+        lines = [f"{topic}: it has no publisher; start one, or let it publish on this topic" for topic in silent]
+        lines += [line for watch in self._watches.values() for line in watch.warnings()]
+        return lines + unconnected(self._subscriptions)
+
+    def silent(self) -> list[str]:
+        """Topics whose publishers have stopped."""
+        return [
+            why
+            for topic, subscription in zip(self._watches, self._subscriptions, strict=True)
+            if subscription.publishers and self._watches[topic].silent()
+            if (why := subscription.why_silent(message_types.JOINT_STATES))
+        ]
+
+    def _watch(self, topics: Mapping[str, list[str]]) -> None:
+        for topic, robots in topics.items():
+            self._watches[topic].use([self._of_robots[robot].joints for robot in robots if robot in self._of_robots])
 
     def _subscribe(self, topic: str, robots: list[str]) -> InputSubscription:
         limit = RateLimit(self._settings["max_rate"])
@@ -92,8 +111,9 @@ class JointSubscriptions:
                 self._refuse([Refusal(topic, Reason.RATE, text, what=Input.JOINT_STATE, sent=sent)])
                 return
             self._accounts.inputs.add(topic, sent)
-            stamp = message.header.stamp
-            self._accounts.metrics.stamped(topic, stamp.sec * 10**9 + stamp.nanosec)
+            stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+            self._accounts.metrics.stamped(topic, stamp)
+            self._watches[topic].receive(stamp, message.name)
             moved = [self._of_robots[robot] for robot in robots if robot in self._of_robots]
             refusals = joint_messages.fill(moved, message, topic, sent, publisher)
             if (kept := joint_messages.kept(message)) is not None:
@@ -156,6 +176,10 @@ class TransformSubscriptions:
     def warnings(self) -> list[str]:
         """Publishers that are not connected; frames that wait for transforms are reported elsewhere."""
         return unconnected(self._subscriptions)
+
+    def silent(self) -> list[str]:
+        """None: frames that wait for transforms are reported elsewhere."""
+        return []
 
     def _subscribe(self, topic: TransformTopic) -> InputSubscription:
         limit = RateLimit(self._max_rate)

@@ -21,10 +21,13 @@ from hpccd_ros.node.status_report import Reporter
 from hpccd_ros.node.stop_watch import StopWatch
 from hpccd_ros.node.stream_detection import StreamDetection
 from hpccd_ros.node.unknown_meshes import UnknownMeshWatch
+from hpccd_ros.node.warning_log import WarningLog
 
 # s. At this interval the pages that a message allocates again cost little; a node that once held much, because its
 # machine was busy for seconds, does not stay larger.
 GIVE_BACK_EVERY = 60.0
+# s between two looks for warnings that the log lacks.
+LOOK_EVERY = 1.0
 SUCCESS = TransitionCallbackReturn.SUCCESS
 
 
@@ -44,6 +47,7 @@ class HpccdNode(GuardedLifecycleNode):
         self._recording = NodeRecording(self, self._settings, self.errors)
         self._configuration.follow(configured=lambda: self._jobs is not None, on_change=self._apply_change)
         self._accounts = Accounts(self.get_logger().warning)
+        self._warning_log = WarningLog(self.get_logger().warning)
         self._reporter = Reporter(self.get_fully_qualified_name(), self._accounts)
         self._robots: RobotDescriptions | None = None
         self._stream: StreamDetection | None = None  # none for a node without meshes and robots
@@ -72,6 +76,7 @@ class HpccdNode(GuardedLifecycleNode):
         self._service = DetectService(self, self._jobs, settings)
         self._action = DetectAction(self, self._jobs)
         self.configured_timer(settings["diagnostics_period"], self._report)
+        self.configured_timer(LOOK_EVERY, self._log_warnings)
         self.configured_timer(GIVE_BACK_EVERY, self._give_back)
         return SUCCESS
 
@@ -80,7 +85,7 @@ class HpccdNode(GuardedLifecycleNode):
         self._recording.follow(active=True)  # first: what the node hears, the recording shall have
         if self._stream is not None:
             self._stream.open(self._publish, self._stop_watch)
-        self._unknown = UnknownMeshWatch(self, self._settings, self._accounts)
+        self._unknown = UnknownMeshWatch(self, self._settings, self._configuration.meshes, self._accounts)
         self.get_logger().info(f"active: {self._configuration.summary(self._contacts.topic)}")
         return SUCCESS
 
@@ -193,15 +198,27 @@ class HpccdNode(GuardedLifecycleNode):
 
     def _warnings(self) -> list[str]:
         parts = (self._robots, self._stream, self._unknown)
-        lines = [line for part in parts if part is not None for line in part.warnings()]
-        return [self._scene_error, *lines] if self._scene_error else lines
+        return [line for part in parts if part is not None for line in part.warnings()]
+
+    def _errors(self) -> list[str]:
+        """Those which the log has as errors."""
+        rejected = self._robots.rejected() if self._robots is not None else []
+        return [self._scene_error, *rejected] if self._scene_error else rejected
+
+    def _silent(self) -> list[str]:
+        return self._stream.silent() if self._stream is not None else []
+
+    def _log_warnings(self) -> None:
+        if self.state == "active":
+            self._warning_log.tell(self._warnings(), lasting=self._silent())
 
     def _report(self) -> None:
         message = self._reporter.report(
             self.get_clock().now().to_msg(),
             state=self.state,
             waiting=self._stream.waiting if self._stream is not None else 0,
-            warnings=self._warnings(),
+            warnings=[*self._errors(), *self._warnings()],
+            silent=self._silent(),
             service=self._jobs.counts,
             errors=(self.errors.count, self.errors.last),
             recording=self._recording.status(),

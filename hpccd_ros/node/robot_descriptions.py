@@ -68,18 +68,21 @@ class RobotDescriptions:
         return newer | {name: f"its description was rejected: {why}" for name, why in self._refused.items()}
 
     def warnings(self) -> list[str]:
-        """Robots that are not known, and descriptions that are invalid."""
+        """Robots that are not known, and publishers that are not connected."""
         waiting = [
             f"robot {name} waits for its description on {self._node.resolve_topic_name(topic)}{self._why(topic)}"
             for name, topic in self._topics.items()
             if name not in self.robots and name not in self._refused
         ]
-        refused = [f"robot {name}: {why}" for name, why in self._refused.items()]
-        return waiting + unconnected(self._subscriptions.values()) + refused
+        return waiting + unconnected(self._subscriptions.values())
+
+    def rejected(self) -> list[str]:
+        """Which descriptions cannot be used; the log has each as an error."""
+        return [f"robot {name}: {why}" for name, why in self._refused.items()]
 
     def _why(self, topic: str) -> str:
         if not self._node.count_publishers(topic):
-            return ", which nobody publishes"
+            return ", which has no publisher; start robot_state_publisher, or name its topic or a URDF file"
         return ": its publisher must be latched (reliable, transient local)"
 
     def _read_files(self, name: str) -> None:

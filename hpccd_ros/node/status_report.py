@@ -3,12 +3,13 @@
 
 import resource
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from hpccd_ros.base.quoting import counted
 from hpccd_ros.middleware import topic_names
 from hpccd_ros.node.accounts import REFUSED_BESIDE_MESHES, Accounts
 from hpccd_ros.node.metrics import percentiles
@@ -35,13 +36,15 @@ class Reporter:
         state: str,
         waiting: int,
         warnings: list[str],
+        silent: Sequence[str] = (),
         service: Mapping[str, int],
         errors: tuple[int, str] = (0, ""),
         recording: tuple[bytes, str, Mapping[str, object]] | None = None,
         stop: tuple[bytes, str, Mapping[str, object]] | None = None,
         coordinate_frame: tuple[str, str] = ("", ""),
     ) -> DiagnosticArray:
-        """coordinate_frame: that of the scene, and what determined it.
+        """silent: inputs on which nothing comes, in words.
+        coordinate_frame: that of the scene, and what determined it.
         errors: how many exceptions nothing expected, and the last one.
         recording: level, message and values of the node's own recording, where there is one.
         stop: those of its topic stop, where there is one.
@@ -54,7 +57,7 @@ class Reporter:
         out = DiagnosticArray()
         out.header.stamp = stamp
         out.status = [
-            self._frames(data, period, waiting, warnings, coordinate_frame),
+            self._frames(data, period, waiting, warnings, silent, coordinate_frame),
             self._detection(data, period, state),
             self._status("service", DiagnosticStatus.OK, topic_names.DETECT, service),
             self._status("process", DiagnosticStatus.OK, state, {"state": state, **_memory()}),
@@ -65,7 +68,13 @@ class Reporter:
         return out
 
     def _frames(
-        self, data: dict, period: float, waiting: int, warnings: list[str], coordinate_frame: tuple[str, str]
+        self,
+        data: dict,
+        period: float,
+        waiting: int,
+        warnings: list[str],
+        silent: Sequence[str],
+        coordinate_frame: tuple[str, str],
     ) -> DiagnosticStatus:
         accounts = self._accounts
         dropped, topologies_refused = accounts.dropped.total, accounts.topologies_refused.total
@@ -97,21 +106,22 @@ class Reporter:
         for stage, text in percentiles(data["transport_ms"]).items():
             values[f"transport_ms.{stage}"] = text
         values["last_refusal"] = accounts.log.last
-        values |= {f"warning.{number}": text for number, text in enumerate(warnings, start=1)}
+        values |= {f"warning.{number}": text for number, text in enumerate([*warnings, *silent], start=1)}
         self._received, self._dropped, self._topologies_refused = (data["received"], dropped, topologies_refused)
         notes = list(warnings)
         if new:
-            notes.insert(0, f"{new} frames dropped")
+            notes.insert(0, f"{counted(new, 'frame')} dropped")
         if new_topologies:
-            notes.insert(0, f"{new_topologies} topologies refused")
+            notes.insert(0, f"{counted(new_topologies, 'topology', 'topologies')} refused")
         for what, name in REFUSED_BESIDE_MESHES.items():
             before, self._refused_beside[what] = self._refused_beside[what], accounts.connections[name]
             if new_of_kind := self._refused_beside[what] - before:
-                notes.insert(0, f"{new_of_kind} {what} refused")
-        if notes:
-            return self._status("frames", DiagnosticStatus.WARN, "; ".join(notes), values)
+                notes.insert(0, f"{counted(new_of_kind, what.removesuffix('s'))} refused")
+        if notes or (silent and came):
+            return self._status("frames", DiagnosticStatus.WARN, "; ".join([*notes, *silent]), values)
         if not came:
-            return self._status("frames", DiagnosticStatus.STALE, f"no frames in the last {period:.1f} s", values)
+            text = "; ".join([f"no frames in the last {period:.1f} s", *silent])
+            return self._status("frames", DiagnosticStatus.STALE, text, values)
         return self._status("frames", DiagnosticStatus.OK, f"{came / period:.1f} frames a second", values)
 
     def _detection(self, data: dict, period: float, state: str) -> DiagnosticStatus:
@@ -137,8 +147,9 @@ class Reporter:
             return self._status("detection", DiagnosticStatus.ERROR, f"failed: {data['last_failure']}", values)
         if coarse:
             text = (
-                f"{coarse} steps with a motion beyond rigid_tolerance: {data['last_coarse']}, so that more is reported "
-                "than touches; send poses or joint states more often, or raise rigid_parts or rigid_tolerance"
+                f"{counted(coarse, 'step')} with a motion beyond rigid_tolerance: {data['last_coarse']}, so that "
+                "more is reported than touches; send poses or joint states more often, or raise rigid_parts or "
+                "rigid_tolerance"
             )
             return self._status("detection", DiagnosticStatus.WARN, text, values)
         return self._status("detection", DiagnosticStatus.OK, f"{rate:.1f} detections a second ({state})", values)
@@ -146,7 +157,7 @@ class Reporter:
     def _errors(self, count: int, last: str) -> DiagnosticStatus:
         # Permanent: what else it broke is unknown.
         level = DiagnosticStatus.ERROR if count else DiagnosticStatus.OK
-        text = f"{count} unexpected errors, the last: {last}" if count else "none"
+        text = f"{counted(count, 'unexpected error')}, the last: {last}" if count else "none"
         return self._status("errors", level, text, {"errors": count, "last_error": last})
 
     def _status(self, part: str, level: bytes, message: str, values: Mapping[str, object]) -> DiagnosticStatus:

@@ -45,6 +45,7 @@ class StreamDetection:
         self._builder = builder
         self._accounts = accounts
         accounts.inputs.restart()
+        accounts.heard.clear()
         self._restart_after = settings["restart_after"]
         self._pipeline, self._by_joints = self._made()
         accounts.add(_load_files(self._pipeline, meshes))
@@ -156,6 +157,10 @@ class StreamDetection:
         ]
         return self._subscriptions.warnings() + of_links + self._pipeline.warnings()
 
+    def silent(self) -> list[str]:
+        """Which messages have stopped, or have not begun, to come."""
+        return self._subscriptions.silent()
+
     def _first(self, frame: SceneFrame, stop: StopWatch | None) -> None:
         """Called by the detection thread."""
         if stop is not None:
@@ -196,7 +201,7 @@ class Subscriptions:
             self._of_others.append(joints)
         for name, mesh in self._meshes.items():
             reception = Reception(self._node, name, self._settings, pipeline, accounts)
-            self._of_meshes.append(MeshSubscriptions(reception, mesh["input"]))
+            self._of_meshes.append(MeshSubscriptions(reception, mesh))
 
     def use(self, pipeline: FramePipeline, by_joints: Mapping[str, JointFrames]) -> None:
         """Send messages to this pipeline from now on."""
@@ -212,6 +217,10 @@ class Subscriptions:
     def warnings(self) -> list[str]:
         """What is odd about the publishers."""
         return [line for part in (*self._of_meshes, *self._of_others) for line in part.warnings()]
+
+    def silent(self) -> list[str]:
+        """Which messages have stopped, or have not begun, to come."""
+        return [line for part in (*self._of_meshes, *self._of_others) for line in part.silent()]
 
 
 def _load_files(pipeline: FramePipeline, meshes: dict[str, dict[str, Any]]) -> Outcome:

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Notice frames of meshes that the node does not have: usually a misspelt name, which nothing else would report."""
 
+import difflib
+from collections.abc import Mapping
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 from hpccd.msg import MeshVertices
-from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import InvalidTopicNameException
-from rclpy.node import Node, NodeNameNonExistentError
+from rclpy.node import Node
 from rclpy.subscription import Subscription
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from sensor_msgs.msg import PointCloud2
@@ -17,8 +18,9 @@ from visualization_msgs.msg import Marker
 
 from hpccd_ros.base.quoting import listed
 from hpccd_ros.frames.drops import Reason, Refusal
-from hpccd_ros.middleware import message_types, qos, topic_names
+from hpccd_ros.middleware import graph, message_types, qos, topic_names
 from hpccd_ros.node.accounts import Accounts
+from hpccd_ros.node.unheard_topics import UnheardTopics
 
 # Bounds the subscriptions that untrusted publishers can cause at a time.
 _MOST_TOPICS = 16
@@ -32,7 +34,6 @@ _TYPES = {
     topic_names.MARKER: (message_types.MARKER, Marker),
     topic_names.POSE: (message_types.POSE, PoseStamped),
 }
-_DETECT = "hpccd/srv/Detect"
 
 
 class UnknownMeshWatch:
@@ -47,8 +48,11 @@ class UnknownMeshWatch:
     counted as dropped; else they are only named.
     """
 
-    def __init__(self, node: Node, settings: dict[str, Any], accounts: Accounts) -> None:
+    def __init__(
+        self, node: Node, settings: dict[str, Any], meshes: Mapping[str, Mapping[str, Any]], accounts: Accounts
+    ) -> None:
         self._node = node
+        self._unheard = UnheardTopics(node, meshes)
         self._known = list(settings["meshes"])
         self._accounts = accounts
         self._count = settings["count_unknown_meshes"]
@@ -67,12 +71,21 @@ class UnknownMeshWatch:
 
     def warnings(self) -> list[str]:
         """One line for each vertex topic that belongs to no mesh, and one for those beyond the bound."""
-        lines = [f"{topic} belongs to no mesh in parameter meshes" for topic in self._topics]
+        known = listed(self._known) or "empty"
+        lines = [
+            f"{topic} belongs to no mesh in the parameter meshes ({known}){self._meant(topic)}"
+            for topic in self._topics
+        ]
         if self._beyond:
             what = "counted" if self._count else "named"
             first, more = self._beyond[0], len(self._beyond)
             lines.append(f"{more} more topics belong to no mesh and are not {what} ({_MOST_TOPICS} are), as {first}")
-        return lines
+        return lines + self._unheard.warnings
+
+    def _meant(self, topic: str) -> str:
+        mesh, _, kind = topic.removeprefix(self._prefix).rpartition("/")
+        meant = [f"{self._prefix}{known}/{kind}" for known in difflib.get_close_matches(mesh, self._known, n=1)]
+        return f"; did you mean {meant[0]}?" if meant else "; add its mesh there, or correct the name"
 
     def _check(self) -> None:
         unknown = self._unknown()
@@ -83,9 +96,7 @@ class UnknownMeshWatch:
         self._found, self._beyond = set(unknown), wanted[free:]
         for topic in wanted[:free]:
             self._topics[topic] = self._listen(topic, *unknown[topic]) if self._count else None
-        if names := ", ".join(wanted[:free]):
-            known = listed(self._known) or "none"
-            self._node.get_logger().warning(f"{names} belongs to no mesh: parameter meshes has {known}")
+        self._unheard.look(unknown)
 
     def _unknown(self) -> dict[str, tuple[str, type]]:
         """Topic -> (mesh, message type)."""
@@ -103,14 +114,7 @@ class UnknownMeshWatch:
 
     def _belongs_to_another(self, mesh: str) -> bool:
         listeners = self._node.get_subscriptions_info_by_topic(f"{self._prefix}{mesh}/{topic_names.TOPOLOGY}")
-        return any(self._detects(listener.node_name, listener.node_namespace) for listener in listeners)
-
-    def _detects(self, name: str, namespace: str) -> bool:
-        try:
-            services = self._node.get_service_names_and_types_by_node(name, namespace)
-        except (NodeNameNonExistentError, RCLError):  # gone meanwhile; no node of ROS, or not known by name yet
-            return False
-        return any(_DETECT in types for _, types in services)
+        return any(graph.detects(self._node, listener.node_name, listener.node_namespace) for listener in listeners)
 
     def _listen(self, topic: str, mesh: str, message: type) -> Subscription:
         name = mesh if mesh in self._names or len(self._names) < _MOST_NAMES else _OTHERS

@@ -54,6 +54,11 @@ class JointFrames:
         return len(self._waiting) * len(self.names)
 
     @property
+    def joints(self) -> Sequence[str]:
+        """Names of the joints that need a position."""
+        return self._robot.kinematics.inputs
+
+    @property
     def begun(self) -> int:
         return self._history.begun
 

@@ -58,7 +58,7 @@ def test_drops_warn_once_and_stay_counted():
     node.accounts.refused(Refusal("ball", Reason.NOT_FINITE, "vertex 1 is nan"))
     node.accounts.refused(Refusal("ball", Reason.OLD_TOPOLOGY, "version 1", what=Input.TOPOLOGY))
     level, text, values = node.report()["/hpccd: frames"]
-    assert level == DiagnosticStatus.WARN and "5 frames dropped" in text and "1 topologies refused" in text
+    assert level == DiagnosticStatus.WARN and "5 frames dropped" in text and "1 topology refused" in text
     assert values["dropped"] == "5" and values["dropped.overload"] == "4"
     assert values["dropped.ball.not_finite"] == "1" and values["topologies_refused.ball.old_topology"] == "1"
     assert values["last_refusal"] == "ball: old_topology: version 1"
@@ -71,7 +71,7 @@ def test_what_moves_meshes_is_told_of_where_it_is_refused():
     for what, key in ((Input.JOINT_STATE, "joint_states_refused"), (Input.TRANSFORM, "transforms_refused")):
         node.accounts.refused(Refusal("topic", Reason.MALFORMED, "stamp has sec -1", what=what))
         level, text, values = node.report()["/hpccd: frames"]
-        assert level == DiagnosticStatus.WARN and f"1 {what} refused" in text
+        assert level == DiagnosticStatus.WARN and f"1 {what.removesuffix('s')} refused" in text
         assert (values[key], values["dropped"]) == ("1", "0")
         assert values["last_refusal"] == "topic: malformed: stamp has sec -1"
         level, text, values = node.report()["/hpccd: frames"]
@@ -92,6 +92,25 @@ def test_warnings_are_told():
     node.accounts.connections["message_lost.x"] += 3
     level, text, values = node.report(warnings=["2 publishers on /x"])["/hpccd: frames"]
     assert level == DiagnosticStatus.WARN and "2 publishers" in text and values["message_lost.x"] == "3"
+
+
+def test_silent_inputs_are_named_and_stay_stale_while_nothing_comes():
+    node = Fixture()
+    silent = ["/meshes/cloth/vertices: it has no publisher"]
+    level, text, values = node.report(warnings=[], silent=silent)["/hpccd: frames"]
+    assert level == DiagnosticStatus.STALE and text.endswith(" s; /meshes/cloth/vertices: it has no publisher")
+    assert values["warning.1"] == silent[0]
+    node.metrics.frame_received("ball", 2.0)
+    level, text, values = node.report(warnings=["x"], silent=silent)["/hpccd: frames"]
+    assert level == DiagnosticStatus.WARN and text == f"x; {silent[0]}"
+    assert (values["warning.1"], values["warning.2"]) == ("x", silent[0])
+
+
+def test_one_and_many():
+    node = Fixture()
+    node.accounts.refused(Refusal("cloth", Reason.OVERLOAD))
+    assert node.report()["/hpccd: frames"][1] == "1 frame dropped"
+    assert node.report(errors=(1, "x"))["/hpccd: errors"][1] == "1 unexpected error, the last: x"
 
 
 def test_coordinate_frame_is_told():

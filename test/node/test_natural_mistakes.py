@@ -1,13 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mistakes that users make with the node: each is answered with the problem and its remedy."""
 
+import itertools
 import json
 import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+from geometry_msgs.msg import PoseStamped
+from hpccd.msg import MeshTopology, MeshVertices
+from sensor_msgs.msg import JointState, PointCloud2
 from sources import SOURCES, SUPPORT
+from waving_sheet import sheet_faces, sheet_positions
+
+from hpccd_ros.middleware import fields, mesh_messages, qos
 
 CLOTH = {"meshes": ["cloth"]}
 TWO = {"meshes": ["cloth", "ball"]}
@@ -160,3 +168,199 @@ def test_mistake_at_the_start(outcomes, name):
 
 def test_foreign_parameters_are_each_warned_of_once(outcomes):
     assert outcomes["foreign"][1].count(" is unknown and has no effect") == 3
+
+
+N = 4
+URDF = """<robot name="arm">
+  <link name="base"/>
+  <link name="upper"><collision><geometry><box size="1 1 1"/></geometry></collision></link>
+  <joint name="shoulder" type="revolute">
+    <parent link="base"/><child link="upper"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>
+  </joint>
+</robot>"""
+
+
+def positions(stamp=1):
+    return mesh_messages.vertices_message(sheet_positions(N, 0), stamp)
+
+
+def topology():
+    message = MeshTopology(version=0, n_vertices=N * N)
+    message.faces = fields.to_field(sheet_faces(N))
+    return message
+
+
+def joints(name, stamp):
+    message = JointState(name=[name], position=[0.1])
+    message.header.stamp = fields.ns_to_stamp(stamp)
+    return message
+
+
+class Mistake:
+    """parameters: of the node. topics: name -> (type, QoS, messages that are sent one after the other, again and
+    again). says: what the log must have, NS stands for the namespace of the node."""
+
+    def __init__(self, parameters, topics, says):
+        self.parameters, self.topics, self.says = parameters, topics, says
+
+
+RELIABLE, BEST_EFFORT, LATCHED = qos.keep_last(5), qos.keep_last(5, reliable=False), qos.keep_last(1, latched=True)
+IN_STREAM = {
+    "wrong-topic": Mistake(
+        CLOTH,
+        {"mesh/cloth/vertices": (MeshVertices, RELIABLE, [positions()])},
+        "NS/mesh/cloth/vertices: the node does not subscribe to this topic; did you mean NS/meshes/cloth/vertices?",
+    ),
+    "wrong-place": Mistake(
+        CLOTH,
+        {"simulation/out": (MeshVertices, RELIABLE, [positions()])},
+        "NS/simulation/out (hpccd/msg/MeshVertices): the node does not subscribe to this topic; publish on "
+        "meshes/NAME/vertices, with a NAME out of the parameter meshes",
+    ),
+    "wrong-mesh": Mistake(
+        CLOTH,
+        {"meshes/clot/vertices": (MeshVertices, RELIABLE, [positions()])},
+        "NS/meshes/clot/vertices belongs to no mesh in the parameter meshes (cloth); did you mean "
+        "NS/meshes/cloth/vertices?",
+    ),
+    "wrong-topic-of-the-topology": Mistake(
+        CLOTH,
+        {"meshes/cloth/toplogy": (MeshTopology, LATCHED, [topology()])},
+        "NS/meshes/cloth/toplogy: the node does not subscribe to this topic; did you mean NS/meshes/cloth/topology?",
+    ),
+    "other-input": Mistake(
+        CLOTH,
+        {"meshes/cloth/points": (PointCloud2, RELIABLE, [PointCloud2()])},
+        "NS/meshes/cloth/points: the node does not subscribe to this topic; set mesh.cloth.input: points, or publish "
+        "on NS/meshes/cloth/vertices",
+    ),
+    "wrong-type": Mistake(
+        CLOTH,
+        {"meshes/cloth/vertices": (PointCloud2, RELIABLE, [PointCloud2()])},
+        "NS/meshes/cloth/vertices: a publisher of node NS/peer sends sensor_msgs/msg/PointCloud2, and the node expects "
+        "hpccd/msg/MeshVertices; publish this type, or use another topic",
+    ),
+    "no-publisher": Mistake(
+        CLOTH,
+        {},
+        "NS/meshes/cloth/vertices: it has no publisher; start one, or let it publish on this topic",
+    ),
+    "publisher-that-stopped": Mistake(
+        CLOTH,
+        {"meshes/cloth/vertices": (MeshVertices, RELIABLE, [])},
+        "NS/meshes/cloth/vertices: no message for 3 s from its publisher of node NS/peer; check that it still ",
+    ),
+    "topology-missing": Mistake(
+        CLOTH,
+        {"meshes/cloth/vertices": (MeshVertices, RELIABLE, [positions(k) for k in range(1, 50)])},
+        "NS/meshes/cloth/topology: it has no publisher; start one",
+    ),
+    "topology-volatile": Mistake(
+        CLOTH,
+        {"meshes/cloth/topology": (MeshTopology, RELIABLE, [topology()])},
+        "NS/meshes/cloth/topology: a publisher of node NS/peer offers volatile but the node requests transient_local, "
+        "so none of its messages are received; let the publisher offer transient_local (latched)",
+    ),
+    "vertices-best-effort": Mistake(
+        CLOTH,
+        {"meshes/cloth/vertices": (MeshVertices, BEST_EFFORT, [positions()])},
+        "offers best_effort but the node requests reliable, so none of its messages are received; set "
+        "input_reliability: best_effort, or let the publisher offer reliable",
+    ),
+    "zero-stamps": Mistake(
+        CLOTH,
+        {
+            "meshes/cloth/topology": (MeshTopology, LATCHED, [topology()]),
+            "meshes/cloth/vertices": (MeshVertices, RELIABLE, [positions(0)]),
+        },
+        "cloth: stamp_repeated: ",
+    ),
+    "count-of-vertices": Mistake(
+        CLOTH,
+        {
+            "meshes/cloth/topology": (MeshTopology, LATCHED, [topology()]),
+            "meshes/cloth/vertices": (
+                MeshVertices,
+                RELIABLE,
+                [mesh_messages.vertices_message(np.zeros((7, 3)), k) for k in range(9)],
+            ),
+        },
+        f"cloth: wrong_vertex_count: 7 vertices, topology version 0 has {N * N}",
+    ),
+    "pose-without-shape": Mistake(
+        CLOTH | {"mesh.cloth.input": "pose"},
+        {"meshes/cloth/pose": (PoseStamped, RELIABLE, [PoseStamped()])},
+        "NS/meshes/cloth/vertices: it has no publisher; start one",
+    ),
+    "joint-states-without-stamp": Mistake(
+        {
+            "robots": ["arm"],
+            "robot.arm.description": "URDF",
+            "robot.arm.joint_states": "joint_states",
+            "robot.arm.pose": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+        },
+        {"joint_states": (JointState, RELIABLE, [joints("shoulder", 0)])},
+        "NS/joint_states: header.stamp is 0 in every message, so the robot does not move; let the publisher set it",
+    ),
+    "joint-states-of-another-robot": Mistake(
+        {
+            "robots": ["arm"],
+            "robot.arm.description": "URDF",
+            "robot.arm.joint_states": "joint_states",
+            "robot.arm.pose": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+        },
+        {"joint_states": (JointState, RELIABLE, [joints("left_shoulder", k * 10**8) for k in range(1, 1000)])},
+        "NS/joint_states: no message names a joint of the robot (shoulder); the last one names left_shoulder; use the "
+        "names of its description; did you mean shoulder?",
+    ),
+    "no-joint-states": Mistake(
+        {
+            "robots": ["arm"],
+            "robot.arm.description": "URDF",
+            "robot.arm.joint_states": "joint_states",
+            "robot.arm.pose": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+        },
+        {},
+        "NS/joint_states: it has no publisher; start one",
+    ),
+    "no-description": Mistake(
+        {"robots": ["arm"], "frame_id": "world"},
+        {},
+        "robot arm waits for its description on NS/robot_description, which has no publisher; start "
+        "robot_state_publisher, or name its topic or a URDF file",
+    ),
+}
+
+
+def test_mistakes_in_streams(start_node, tmp_path):
+    """All at once, each with a node of its own: the time is that of waiting."""
+    (tmp_path / "arm.urdf").write_text(URDF)
+    running = []
+    for name, mistake in IN_STREAM.items():
+        parameters = {
+            key: str(tmp_path / "arm.urdf") if value == "URDF" else value for key, value in mistake.parameters.items()
+        }
+        node = start_node(parameters, wait=False)
+        publishers = [
+            (node.peer.node.create_publisher(kind, topic, profile), itertools.cycle(messages) if messages else ())
+            for topic, (kind, profile, messages) in mistake.topics.items()
+        ]
+        running.append((name, node, publishers, mistake.says.replace("NS", node.namespace)))
+    lacking = dict.fromkeys(IN_STREAM)
+
+    def all_said():
+        for name, node, publishers, says in running:
+            for publisher, messages in publishers:
+                if (message := next(iter(messages), None)) is not None:
+                    publisher.publish(message)
+            if says in node.output():
+                lacking.pop(name, None)
+        return not lacking
+
+    try:
+        running[0][1].wait_until(all_said, "every mistake in the log")
+    except AssertionError:
+        outputs = [f"{name}: {node.output()}" for name, node, _, _ in running if name in lacking]
+        raise AssertionError(f"not said: {list(lacking)}\n" + "\n".join(outputs)) from None
+    for _, node, _, says in running:
+        assert node.output().count(says) == 1, "once an episode"

@@ -252,7 +252,7 @@ def test_incompatible_qos_is_told(start_node):
         lambda: node.peer.statuses["frames"][2].get("qos_incompatible.meshes/cloth/vertices") == "1",
         "QoS incompatibility in the diagnostics",
     )
-    assert "input_reliability" in node.output()
+    node.wait_until(lambda: "input_reliability" in node.output(), "the remedy in the log")
 
 
 def test_restarted_publisher_is_heard_at_once(start_node):

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Each cause is in the log once, until it has been gone for a while; what it is told of lasts."""
+
+import pytest
+
+from hpccd_ros.node.joint_state_watch import JointStateWatch
+from hpccd_ros.node.silence import Silence
+from hpccd_ros.node.warning_log import WarningLog
+
+
+class Clock:
+    now = 100.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture
+def log(clock):
+    """tell(seconds, new, lasting): looks once a second for so long; returns what is logged."""
+    logged = []
+    written = WarningLog(logged.append, clock)
+
+    def tell(seconds, new=(), lasting=()):
+        logged.clear()
+        for _ in range(seconds):
+            clock.now += 1.0
+            written.tell(new, lasting)
+        return list(logged)
+
+    return tell
+
+
+def test_a_cause_that_lasts_is_logged_once(log):
+    assert log(2, ["no transform"]) == []
+    assert log(60, ["no transform"]) == ["no transform"]
+
+
+def test_what_has_lasted_is_logged_at_once(log):
+    assert log(60, lasting=["/points: no message"]) == ["/points: no message"]
+
+
+def test_a_cause_that_comes_and_goes_within_a_moment_is_not_logged(log):
+    for _ in range(5):
+        assert log(2, ["flicker"]) == [] and log(1) == []
+
+
+def test_a_cause_comes_back_as_a_new_episode(log):
+    assert log(3, ["x"]) == ["x"]
+    assert log(8) == [] and log(3, ["x"]) == [], "gone for too short a time"
+    assert log(11) == [] and log(3, ["x"]) == ["x"]
+
+
+def test_numbers_make_no_new_cause_but_names_do(log):
+    assert log(3, ["stamp 12 ns, 1,000 more, -1.5"]) == ["stamp 12 ns, 1,000 more, -1.5"]
+    assert log(5, ["stamp 13 ns, 7 more, 2.5"]) == []
+    assert log(3, ["/cloth1/a waits"]) and log(3, ["/cloth2/a waits"])
+
+
+def test_silence(clock):
+    silence = Silence(clock)
+    clock.now += 2.9
+    assert not silence.lasts(0)
+    clock.now += 0.1
+    assert silence.lasts(0) and not silence.lasts(1)
+    clock.now += 3.0
+    assert silence.lasts(1)
+
+
+@pytest.fixture
+def watch(clock):
+    watch = JointStateWatch("/joint_states", clock)
+    watch.use([("shoulder", "elbow")])
+    assert watch.warnings() == []
+    return watch
+
+
+def test_joint_states_that_advance(watch, clock):
+    for k in range(10):
+        clock.now += 1.0
+        watch.receive(k, ["elbow", "gripper"])
+        assert watch.warnings() == []
+
+
+@pytest.mark.parametrize("stamp, says", [(0, "header.stamp is 0 in every message"), (7, "stays at 7 ns")])
+def test_a_stamp_that_does_not_advance(watch, clock, stamp, says):
+    for _ in range(3):
+        watch.receive(stamp, ["elbow"])
+        assert watch.warnings() == []
+        clock.now += 1.0
+    watch.receive(stamp, ["elbow"])
+    (line,) = watch.warnings()
+    assert line.startswith("/joint_states: ") and says in line and "; let the publisher set it" in line
+    watch.receive(stamp + 1, ["elbow"])
+    assert watch.warnings() == []
+
+
+def test_a_stream_that_ends_is_no_stamp_that_stays(watch, clock):
+    watch.receive(5, ["elbow"])
+    assert not watch.silent()
+    clock.now += 60.0
+    assert watch.warnings() == [] and watch.silent()
+
+
+def test_a_clock_that_is_set_back_advances_from_there(watch, clock):
+    watch.receive(60 * 10**9, ["elbow"])
+    for k in range(5):
+        clock.now += 1.0
+        watch.receive(k, ["elbow"])
+        assert watch.warnings() == []
+
+
+def test_names_of_no_joint(watch, clock):
+    for k in range(4):
+        watch.receive(k, ["left_elbow", "left_wrist"])
+        assert watch.warnings() == [] or k == 3
+        clock.now += 1.0
+    (line,) = watch.warnings()
+    assert "no message names a joint of the robot (elbow, shoulder); the last one names left_elbow, left_wrist" in line
+    assert line.endswith("; did you mean elbow?")
+    watch.receive(9, ["shoulder"])
+    assert watch.warnings() == []
+
+
+def test_before_a_robot_is_known_no_name_is_wrong(clock):
+    watch = JointStateWatch("/joint_states", clock)
+    for k in range(9):
+        watch.receive(k, ["anything"])
+        clock.now += 1.0
+    assert watch.warnings() == []
