@@ -17,6 +17,7 @@ suffix ns (the frame at --to is included). Results of steps that began before th
 from pathlib import Path
 
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import counted
 
 
 def configure(parser):
@@ -56,7 +57,10 @@ def run(args) -> int:
             raise UserError(f"-o {args.output}: already exists; give another name") from error
         except OSError as error:
             raise UserError(f"-o {args.output}: {error.strerror}") from error
-    print(f"{args.output}: {part.count:,} messages, from {seconds(part.begin)} to {seconds(part.end)} s of {args.file}")
+    print(
+        f"{args.output}: {counted(part.count, 'message')}, from {seconds(part.begin)} to {seconds(part.end)} s of "
+        f"{args.file}"
+    )
     if part.in_force:
         print(f"  {part.in_force:,} of them were received earlier and were in force at its beginning")
     return 0

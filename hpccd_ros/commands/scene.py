@@ -18,6 +18,7 @@ seconds the first time; it is then kept in the cache folder ($XDG_CACHE_HOME or 
 """
 
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import counted
 
 
 def configure(parser):
@@ -90,8 +91,8 @@ def run(args) -> int:
     except ValueError as error:
         raise UserError(str(error)) from error
     print(
-        f"{scene.name}: {scene.title}; {scene.n_triangles:,} triangles, {scene.n_vertices:,} vertices, "
-        f"{scene.n_frames} frames",
+        f"{scene.name}: {scene.title}; {counted(scene.n_triangles, 'triangle')}, "
+        f"{counted(scene.n_vertices, 'vertex', 'vertices')}, {counted(scene.n_frames, 'frame')}",
         flush=True,
     )
     asked = [args.publish, args.mcap, args.npz, args.params, args.png]
@@ -99,7 +100,7 @@ def run(args) -> int:
         for mesh in scene.meshes:
             static = ", static" if mesh.static else ""
             self_collision = "" if mesh.self_collision else ", no self-collision"
-            print(f"  {mesh.name}: {len(mesh.faces):,} triangles{static}{self_collision}")
+            print(f"  {mesh.name}: {counted(len(mesh.faces), 'triangle')}{static}{self_collision}")
         print("add --publish, --mcap FILE, --npz FILE, --params FILE or --png FILE to use it")
     frames = _frames(scene, args.at) if args.png else []
     if args.step is not None and not 1 <= args.step < scene.n_frames:
@@ -117,7 +118,7 @@ def run(args) -> int:
         count = publish(
             scene, args.rate, args.loop, args.wait, args.ros_args, progress=True, subscribers=args.subscribers
         )
-        print(f"published {count} frames", flush=True)
+        print(f"published {counted(count, 'frame')}", flush=True)
     return 0
 
 

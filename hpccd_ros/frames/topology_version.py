@@ -3,6 +3,7 @@
 
 from collections import deque
 
+from hpccd_ros.base.quoting import counted
 from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
 from hpccd_ros.frames.types import UNKNOWN_TIME, MeshFrame, Topology
 
@@ -87,6 +88,7 @@ def check_frame(mesh: str, frame: MeshFrame, topology: Topology) -> Refusal | No
         text = f"vertices belong to topology version {frame.version}, version {topology.version} is in force"
         return Refusal(mesh, Reason.OLD_TOPOLOGY, text, sent=frame.sent)
     if len(frame.vertices) != topology.n_vertices:
-        text = f"{len(frame.vertices)} vertices, topology version {topology.version} has {topology.n_vertices}"
+        given = counted(len(frame.vertices), "vertex", "vertices")
+        text = f"{given}, topology version {topology.version} has {topology.n_vertices}"
         return Refusal(mesh, Reason.WRONG_COUNT, text, sent=frame.sent)
     return None

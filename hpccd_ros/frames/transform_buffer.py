@@ -9,7 +9,7 @@ back.
 from bisect import bisect_left
 
 from hpccd_core.rigid.transform import IDENTITY, Rigid
-from hpccd_ros.base.quoting import listed, quoted
+from hpccd_ros.base.quoting import counted, listed, quoted
 from hpccd_ros.frames.samples import Run, Samples
 from hpccd_ros.frames.types import ALWAYS, OUTDATED, UNKNOWN_TIME
 
@@ -207,7 +207,7 @@ class TransformBuffer:
 
 
 def _messages(count: int | str) -> str:
-    return count if isinstance(count, str) else f"{count or 'no'} messages"
+    return count if isinstance(count, str) else counted(count, "message") if count else "no messages"
 
 
 def _unconnected(source: str, target: str) -> NoTransformError:

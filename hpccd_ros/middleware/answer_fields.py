@@ -10,6 +10,7 @@ import numpy as np
 from hpccd.msg import ContactArray
 
 from hpccd_core.options import FEATURES, REPORTS
+from hpccd_ros.base.quoting import counted
 from hpccd_ros.detect.separation import MotionBounds, Separation
 from hpccd_ros.frames.taken_inputs import TakenInput
 
@@ -66,9 +67,12 @@ def read_bounds(message: ContactArray) -> MotionBounds:
     """Raises ValueError if the fields are inconsistent."""
     bounds, meshes = np.frombuffer(message.motion_bounds, np.float64), len(message.mesh_names)
     if len(bounds) != (meshes if message.parts else 0):
-        raise ValueError(f"motion_bounds has {len(bounds)} entries for {meshes} meshes and {message.parts} parts")
+        raise ValueError(
+            f"motion_bounds: {counted(len(bounds), 'entry', 'entries')} for {counted(meshes, 'mesh', 'meshes')} and "
+            f"{counted(message.parts, 'part')}"
+        )
     if not (np.isfinite(bounds).all() and (bounds >= 0).all()):
-        raise ValueError("motion_bounds holds what is no bound: they are finite and not negative")
+        raise ValueError("motion_bounds: bounds must be finite and not negative")
     return MotionBounds(message.parts, tuple(bounds.tolist()))
 
 

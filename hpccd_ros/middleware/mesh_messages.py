@@ -10,7 +10,7 @@ from hpccd.msg import MeshTopology, MeshVertices
 from sensor_msgs.msg import PointCloud2, PointField
 
 from hpccd_core.rigid.transform import Rigid
-from hpccd_ros.base.quoting import listed
+from hpccd_ros.base.quoting import counted, listed
 from hpccd_ros.frames.coordinates import unusable_coordinates
 from hpccd_ros.frames.drops import Reason
 from hpccd_ros.frames.types import NO_EDGES, Topology
@@ -41,7 +41,9 @@ def topology_from_message(message: MeshTopology, limits: Mapping[str, int]) -> T
 def _features(field: str, indices: array.array, corners: int, limits: Mapping[str, int]) -> np.ndarray:
     flat = np.frombuffer(indices, np.uint32)
     if len(flat) % corners:
-        raise InvalidMessageError(Reason.MALFORMED, f"{field} has {len(flat)} indices, not a multiple of {corners}")
+        raise InvalidMessageError(
+            Reason.MALFORMED, f"{field} has {counted(len(flat), 'index', 'indices')}, not a multiple of {corners}"
+        )
     check_size(field, len(flat) // corners, f"max_{field}", limits[f"max_{field}"])
     return flat.reshape(-1, corners)
 
@@ -57,7 +59,9 @@ def vertices_from_message(message: MeshVertices, max_vertices: int) -> np.ndarra
         raise InvalidMessageError(Reason.MALFORMED, f"fill exactly one of vertices_f32 and vertices_f64; {which}")
     flat = np.frombuffer(single, np.float32) if len(single) else np.frombuffer(double, np.float64)
     if len(flat) % 3:
-        raise InvalidMessageError(Reason.MALFORMED, f"vertices has {len(flat)} coordinates, not a multiple of 3")
+        raise InvalidMessageError(
+            Reason.MALFORMED, f"vertices has {counted(len(flat), 'coordinate')}, not a multiple of 3"
+        )
     check_size("vertices", len(flat) // 3, "max_vertices", max_vertices)
     return usable(flat.reshape(-1, 3))
 
@@ -88,7 +92,8 @@ def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
     if len(cloud.data) < needed:
         raise InvalidMessageError(
             Reason.MALFORMED,
-            f"data has {len(cloud.data)} bytes, {cloud.height} rows of {cloud.width} points need {needed}",
+            f"data has {counted(len(cloud.data), 'byte')}, {counted(cloud.height, 'row')} of "
+            f"{counted(cloud.width, 'point')} need {needed}",
         )
     if count == 0:
         raise InvalidMessageError(Reason.MALFORMED, "the cloud has no points")

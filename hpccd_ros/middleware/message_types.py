@@ -23,7 +23,7 @@ _TYPE_NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/([a-z]+)/([A-Za-z][A-Za-z0-9_]
 def split_type_name(type_name: str) -> tuple[str, str, str]:
     """("pkg", "msg", "Name") of "pkg/msg/Name". Raises LookupError if the name has another form."""
     if (match := _TYPE_NAME.fullmatch(type_name)) is None:
-        raise LookupError(f"{type_name!r} is no name of a message type (package/msg/Name)")
+        raise LookupError(f"{type_name!r} is not the name of a message type; write package/msg/Name")
     return match[1], match[2], match[3]
 
 
@@ -36,5 +36,5 @@ def message_class(type_name: str):
     except (ImportError, AttributeError) as error:
         raise LookupError(f"message type {type_name} is not installed here: {error}") from error
     if not hasattr(found, "get_fields_and_field_types"):
-        raise LookupError(f"{type_name} is no message type")
+        raise LookupError(f"{type_name} is not a message type; use one of package/msg")
     return found

@@ -116,7 +116,7 @@ def unmet_demand(error: Exception) -> str | None:
     if os.environ.get("ROS_SECURITY_ENABLE") != "true" or type(error).__name__ not in ("RCLError", "NodeError"):
         return None
     text = " ".join(str(error).split())
-    why = f"DDS security is demanded (ROS_SECURITY_ENABLE=true) and cannot be had, so nothing is started: {text}"
+    why = f"DDS security is required (ROS_SECURITY_ENABLE=true) and not available, so nothing is started: {text}"
     if "security libraries" in text:
         return (
             f"{why}. The Fast DDS of the Python wheels is built without security; use a ROS 2 installation whose DDS "

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from visualization_msgs.msg import Marker
 
 from hpccd_core.rigid.transform import Rigid
+from hpccd_ros.base.quoting import counted
 from hpccd_ros.frames.drops import Reason
 from hpccd_ros.frames.types import Topology
 from hpccd_ros.frames.welding import Welding
@@ -30,7 +31,7 @@ class CdrReader:
     def __init__(self, data: bytes) -> None:
         order = _ORDERS.get(bytes(data[:2]))
         if order is None or len(data) < _HEADER:
-            raise _malformed(f"its bytes begin with {bytes(data[:_HEADER]).hex() or 'nothing'}, which is no plain CDR")
+            raise _malformed(f"its bytes begin with {bytes(data[:_HEADER]).hex() or 'nothing'}, which is not plain CDR")
         self._data, self._order, self._at = data, order, _HEADER
 
     def numbers(self, code: str, count: int) -> NDArray:
@@ -40,7 +41,7 @@ class CdrReader:
             self._at += -(self._at - _HEADER) % kind.itemsize
         end = self._at + count * kind.itemsize
         if end > len(self._data):
-            raise _malformed(f"it has {len(self._data)} bytes, and its fields need {end} or more")
+            raise _malformed(f"it has {counted(len(self._data), 'byte')}, and its fields need {end} or more")
         found = np.frombuffer(self._data, kind.newbyteorder(self._order), count, self._at)
         self._at = end
         return found.astype(kind)
@@ -86,7 +87,8 @@ def mesh_from_shape(data: bytes, sent: int, max_vertices: int, max_faces: int) -
     if (highest := int(faces.max())) >= len(vertices):
         raise InvalidMessageError(
             Reason.INDEX_RANGE,
-            f"triangle {int(faces.argmax()) // 3} names vertex {highest}, there are {len(vertices)} vertices",
+            f"triangle {int(faces.argmax()) // 3} names vertex {highest}, the mesh has "
+            f"{counted(len(vertices), 'vertex', 'vertices')}",
         )
     return WholeMesh(sent, "", usable(vertices), numbered(faces, len(vertices)))
 
@@ -123,7 +125,7 @@ def mesh_from_marker(data: bytes, max_vertices: int, max_faces: int, welding: We
     reader.numbers("u1", 1)  # whether it follows its frame
     points = reader.numbers("f8", 3 * _size("points", reader, "max_faces", 3 * max_faces)).reshape(-1, 3)
     if len(points) % 3:
-        raise InvalidMessageError(Reason.MALFORMED, f"points has {len(points)} points, not a multiple of 3")
+        raise InvalidMessageError(Reason.MALFORMED, f"points has {counted(len(points), 'point')}, not a multiple of 3")
     local, faces = welding.vertices_and_faces(usable(points))
     check_size("vertices", len(local), "max_vertices", max_vertices)
     # By 1 too, which changes no bit.

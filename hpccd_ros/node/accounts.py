@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from hpccd_ros.base.quoting import listed, shortened
+from hpccd_ros.base.quoting import counted, listed, shortened
 from hpccd_ros.detect.step_detector import Detection
 from hpccd_ros.frames.drops import Input, Reason, Refusal, RefusalCounter
 from hpccd_ros.frames.taken_inputs import TakenInputs
@@ -113,7 +113,7 @@ def _coarse(found: Detection) -> str:
     # The bound includes rounding, which the tolerance does not.
     if bound <= 1.01 * rigid.tolerance:
         return ""
-    return f"{mesh} was up to {bound:.3g} beside the straight lines of {bounds.parts} parts"
+    return f"{mesh} was up to {bound:.3g} beside the straight lines of {counted(bounds.parts, 'part')}"
 
 
 # Texts quote untrusted names (of frames, of fields), which may be of any length.

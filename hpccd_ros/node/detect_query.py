@@ -12,7 +12,7 @@ from hpccd.srv import Detect
 
 import hpccd_core as hc
 from hpccd_core import arguments
-from hpccd_ros.base.quoting import not_one_of, shortened
+from hpccd_ros.base.quoting import counted, not_one_of, shortened
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NONE, Separation
@@ -128,7 +128,7 @@ def _contacts(asked: Asked, query: Query) -> Answer:
     )
     answer_fields.fill_separation(message, asked.options.separation)
     answer_fields.fill_features(message, asked.options.features)
-    return Answer(f"{message.total} contacts", contacts=message)
+    return Answer(counted(message.total, "contact"), contacts=message)
 
 
 def _collision_free_step(asked: Asked, query: Query) -> Answer:
@@ -144,7 +144,7 @@ def _proximity(asked: Asked, query: Query) -> Answer:
         message, near, asked.layout, max_contacts=asked.max_contacts, outputs=asked.options.outputs
     )
     answer_fields.fill_features(message, asked.options.features)
-    return Answer(f"{message.total} pairs within {query.distance:g}", contacts=message)
+    return Answer(f"{counted(message.total, 'pair')} within {query.distance:g}", contacts=message)
 
 
 def _intersections(asked: Asked, query: Query) -> Answer:
@@ -152,7 +152,7 @@ def _intersections(asked: Asked, query: Query) -> Answer:
     hits = asked.detector.intersections(asked.end)
     asked.enter(WRITING)
     snapshot_messages.fill_intersections(message, hits, asked.layout, max_contacts=asked.max_contacts)
-    return Answer(f"{message.total} edges in faces", contacts=message)
+    return Answer(f"{counted(message.total, 'edge')} in faces", contacts=message)
 
 
 def _distances(asked: Asked, query: Query) -> Answer:
@@ -160,7 +160,7 @@ def _distances(asked: Asked, query: Query) -> Answer:
     gaps = asked.detector.distances(asked.end)
     asked.enter(WRITING)
     snapshot_messages.fill_distances(message, gaps, asked.layout)
-    return Answer(f"{len(gaps)} pairs of meshes", distances=message)
+    return Answer(f"{counted(len(gaps), 'pair')} of meshes", distances=message)
 
 
 ANSWERS: dict[str, Callable[[Asked, Query], Answer]] = {

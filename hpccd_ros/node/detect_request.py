@@ -9,7 +9,7 @@ import numpy as np
 from hpccd.msg import MeshVertices
 
 from hpccd_core.options import ACCURACIES, REPORTS
-from hpccd_ros.base.quoting import listed, quoted, repeated, shortened
+from hpccd_ros.base.quoting import counted, listed, quoted, repeated, shortened
 from hpccd_ros.detect.core import Cancellation, Options, make_detector
 from hpccd_ros.detect.kept_detectors import DetectorOf, KeptDetectors
 from hpccd_ros.detect.layout import Layout
@@ -55,7 +55,10 @@ def compute(
     for field in ("topologies", "end") if query.of_snapshot else ("topologies", "start", "end"):
         given = len(getattr(request, field))
         if given != len(names) and not (field == "topologies" and given == 0):
-            raise RequestError(f"{field}: {given} entries for {len(names)} meshes ({listed(names)})")
+            raise RequestError(
+                f"{field}: {counted(given, 'entry', 'entries')} for {counted(len(names), 'mesh', 'meshes')} "
+                f"({listed(names)})"
+            )
     topologies = tuple(_topology(request, scene, limits, i, name) for i, name in enumerate(names))
     end = _vertices("end", names, request.end, topologies, limits["max_vertices"])
     start = end
@@ -102,7 +105,9 @@ def _names(request: Request, scene: NodeScene, most: int) -> list[str]:
     if not names:
         raise RequestError("mesh_names: empty, and the node has no meshes of its own")
     if len(names) > most:
-        raise RequestError(f"mesh_names: {len(names)} meshes, at most {most} are taken (parameter max_meshes)")
+        raise RequestError(
+            f"mesh_names: {counted(len(names), 'mesh', 'meshes')}, at most {most} are taken (parameter max_meshes)"
+        )
     if len(set(names)) != len(names):
         raise RequestError(f"mesh_names: names must differ, {repeated(names)} is there twice")
     return names
@@ -141,6 +146,8 @@ def _vertices(
                 f"{where}: topology_version {message.topology_version}, the topology has version {topology.version}"
             )
         if len(vertices) != topology.n_vertices:
-            raise RequestError(f"{where}: {len(vertices)} vertices, the topology has {topology.n_vertices}")
+            raise RequestError(
+                f"{where}: {counted(len(vertices), 'vertex', 'vertices')}, the topology has {topology.n_vertices}"
+            )
         parts.append(vertices)
     return parts[0] if len(parts) == 1 else np.concatenate(parts)

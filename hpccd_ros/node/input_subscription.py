@@ -11,6 +11,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from hpccd_ros.base.quoting import counted
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.types import Outcome
 from hpccd_ros.middleware import graph, qos_overrides
@@ -82,7 +83,10 @@ class InputSubscription:
         self._any_unconnected = bool(lines)
         lines = list(dict.fromkeys(lines))
         more = len(lines) - MOST_REPORTED
-        return [*lines[:MOST_REPORTED], *([f"{self.topic}: {more} more such publishers"] if more > 0 else [])]
+        return [
+            *lines[:MOST_REPORTED],
+            *([f"{self.topic}: {counted(more, 'more such publisher')}"] if more > 0 else []),
+        ]
 
     def why_silent(self, type_name: str) -> str:
         """Why no message comes, in words, and the remedy; "": `warnings` says it. type_name: of its messages."""

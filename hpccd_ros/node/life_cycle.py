@@ -79,7 +79,7 @@ class GuardedLifecycleNode(LifecycleNode):
             if wanted.label in offered if wanted.label else wanted.id in offered.values():
                 return change(request, response)
             self.get_logger().warning(
-                f"no transition {wanted.label or wanted.id} from {self.state}, which has "
+                f"transition {wanted.label or wanted.id}: not available while the node is {self.state}; use one of "
                 + (", ".join(f"{label} ({number})" for label, number in offered.items()) or "none"),
                 throttle_duration_sec=1.0,
             )

@@ -11,6 +11,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
+from hpccd_ros.base.quoting import counted
 from hpccd_ros.detect.core import unusable_topology
 from hpccd_ros.frames.arrivals import RateLimit, SequenceWatch
 from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
@@ -222,8 +223,8 @@ class PositionsSubscription(MeshTopic):
             self.refuse(Reason.MALFORMED, f"{self.name}: {UNREADABLE}", missing)
             return
         text = (
-            f"{missing} messages did not reach the node: they came faster than it reads (parameter input_depth) or "
-            "could not be deserialised (see the log of DDS)"
+            f"{counted(missing, 'message')} did not reach the node: sent faster than it reads (parameter input_depth), "
+            "or not to be deserialised (see the log of DDS)"
         )
         self.refuse(Reason.MIDDLEWARE, text, missing)
 

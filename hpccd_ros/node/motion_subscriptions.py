@@ -14,6 +14,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from hpccd_ros.base.clocks import Clocks
+from hpccd_ros.base.quoting import counted
 from hpccd_ros.frames.arrivals import InterleavedSequences, RateLimit
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
@@ -216,7 +217,7 @@ class TransformSubscriptions:
                 return
             self._accounts.inputs.add(topic.name, sent)
             if lost > 0:
-                text = f"{lost} messages on {name} were lost, or could not be deserialised; send them again"
+                text = f"{name}: lost, or not to be deserialised: {counted(lost, 'message')}; send them again"
                 refusal = Refusal(topic.name, Reason.MIDDLEWARE, text, lost, what=Input.TRANSFORM, sent=sent - 1)
                 self._unread(refusal, topic)
             for refusal in transform_topics.fill(self._pipeline.transforms, message, topic, sent):

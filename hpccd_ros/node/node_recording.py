@@ -17,6 +17,7 @@ from rclpy.qos import ReliabilityPolicy
 
 from hpccd_ros.bag import writer
 from hpccd_ros.bag.writer import BagWriter
+from hpccd_ros.base.quoting import counted
 from hpccd_ros.middleware.executors import Errors, GuardedExecutor
 from hpccd_ros.params import node_parameters
 from hpccd_ros.record import attachments, recorded_topics
@@ -106,7 +107,7 @@ def _no_place(target: Path) -> str | None:
     if not (existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)):
         return f"the folder {existing} is not writable"
     if missing > MOST_NEW_FOLDERS:
-        return f"{missing} folders are missing on the way to it, at most {MOST_NEW_FOLDERS} are made"
+        return f"{counted(missing, 'missing folder')} on the way to it, at most {MOST_NEW_FOLDERS} are made"
     longest, whole = (os.pathconf(existing, limit) for limit in ("PC_NAME_MAX", "PC_PATH_MAX"))
     names = [*path.parts[-missing - 1 : -1], target.name + NUMBER]
     if any(len(os.fsencode(name)) > longest for name in names):
@@ -187,7 +188,8 @@ class _Running:
         lost = f", {values['lost']} lost on the way" if values["lost"] else ""
         errors = f", {values['not_written']} NOT WRITTEN ({bag.last_error})" if bag.write_errors else ""
         missing = "".join(f"; {text}" for text in self._missing())
-        return f"recorded {bag.message_count} messages, {bag.size / 1e6:.2f} MB{lost}{errors}: {bag.path}{missing}"
+        count = counted(bag.message_count, "message")
+        return f"recorded {count}, {bag.size / 1e6:.2f} MB{lost}{errors}: {bag.path}{missing}"
 
     def status(self, running: bool) -> tuple[bytes, str, dict[str, object]]:
         values = self._values()

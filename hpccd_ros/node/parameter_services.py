@@ -52,7 +52,7 @@ def _all(node, set_atomically):
 
 def _refusal(node: Node, given: Parameter) -> SetParametersResult | None:
     if given.value.type not in TYPES:
-        reason = f"{given.name}: {given.value.type} is no type of rcl_interfaces/msg/ParameterType"
+        reason = f"{given.name}: type {given.value.type} is not valid; use one of rcl_interfaces/msg/ParameterType"
     elif not node.has_parameter(given.name):
         reason = values.undeclared(given.name, node.list_parameters([], 0).names)
     else:

@@ -7,6 +7,7 @@ from typing import Any
 from rclpy.node import Node
 
 from hpccd_core import Cancelled, MeshFileError, load_mesh
+from hpccd_ros.base.quoting import counted
 from hpccd_ros.detect.core import CORE_ERRORS, unusable_topology
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.step_detector import Detection, StepDetector
@@ -151,7 +152,7 @@ class StreamDetection:
     def warnings(self) -> list[str]:
         """What is odd about the publishers."""
         of_links = [
-            f"{lines[0]}{f'; {len(lines) - 1} more links wait' if len(lines) > 1 else ''}"
+            lines[0] + (f"; {counted(len(lines) - 1, 'more link')} of it waiting" if len(lines) > 1 else "")
             for robot in self._configuration.robots.values()
             if (lines := [line for mesh in robot.meshes for line in self._pipeline.awaited_transform(mesh.name)])
         ]

@@ -16,7 +16,7 @@ from sensor_msgs.msg import PointCloud2
 from shape_msgs.msg import Mesh
 from visualization_msgs.msg import Marker
 
-from hpccd_ros.base.quoting import listed
+from hpccd_ros.base.quoting import counted, listed
 from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.middleware import graph, message_types, qos, topic_names
 from hpccd_ros.node.accounts import Accounts
@@ -79,7 +79,10 @@ class UnknownMeshWatch:
         if self._beyond:
             what = "counted" if self._count else "named"
             first, more = self._beyond[0], len(self._beyond)
-            lines.append(f"{more} more topics belong to no mesh and are not {what} ({_MOST_TOPICS} are), as {first}")
+            lines.append(
+                f"{counted(more, 'more topic')} without a mesh, not {what} ({_MOST_TOPICS} are), such as {first}; add "
+                "their meshes to the parameter meshes, or end their publishers"
+            )
         return lines + self._unheard.warnings
 
     def _meant(self, topic: str) -> str:

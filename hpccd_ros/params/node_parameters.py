@@ -59,7 +59,7 @@ def call(node, service, name, requests, *, deadline, remote, stop=()):
             patience = max(deadline, asked + 2.0)
             while not (answered := [future for future in futures if future.done()]):
                 if time.monotonic() > patience:
-                    raise UserError(f"the node {remote} does not answer the call of {name}")
+                    raise UserError(f"{name}: the node {remote} does not respond; wait, or start it again")
                 if not results and time.monotonic() > asked + ASK_AGAIN * (2 ** len(futures) - 1):
                     futures.append(client.call_async(request))
                 _spin_once(node, stop)

@@ -56,8 +56,8 @@ def ignored_pairs(
     for one in _structured(settings, "ignored"):
         if one.names[0] == one.names[1] and one.names[0] not in settings["robots"]:
             raise ParameterError(
-                f"{one.parameter}: both meshes of the pair are {one.names[0]}; whether a mesh is tested against "
-                f"itself is said by mesh.{one.names[0]}.self_collision"
+                f"{one.parameter}: both meshes of the pair are {one.names[0]}; to switch off tests within a mesh set "
+                f"mesh.{one.names[0]}.self_collision: false"
             )
         given.append(one)
     ignored = {pair: pair for pair in by_default}
@@ -187,7 +187,7 @@ def _spread(agreed: Sequence[_PairSetting], settings: dict[str, Any], links: Lin
     for pair, (first, one) in clashes.items():
         raise ParameterError(
             f"{one.parameter}: {quoted(one.text)} contradicts {quoted(first.text)} ({first.parameter}) for "
-            f"{' and '.join(sorted(pair))}; say of these two links what holds"
+            f"{' and '.join(sorted(pair))}; give these two links a value of their own"
         )
     return list(found.values())
 

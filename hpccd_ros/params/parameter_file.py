@@ -26,7 +26,9 @@ def read_parameters(path) -> dict[str, Any]:
     sections = tree.values() if isinstance(tree, dict) else ()
     found = [section.get("ros__parameters") if isinstance(section, dict) else None for section in sections]
     if not found or not all(isinstance(parameters, dict) for parameters in found):
-        raise UserError(f"--params {path}: no ROS parameter file (node name, ros__parameters, names)")
+        raise UserError(
+            f"--params {path}: not a ROS parameter file; write node name or /**, ros__parameters, names and values"
+        )
     flat: dict[str, Any] = {}
     for parameters in found:
         flat |= _flat("", parameters)

@@ -106,8 +106,8 @@ def features(settings: dict[str, Any]) -> tuple[str, ...]:
     """Parameter ``features``, in the order of FEATURES. Raises ParameterError."""
     if not settings["features"]:
         raise ParameterError(
-            f"features: empty, so nothing would be tested; name {' or '.join(FEATURES)}, or both; meshes that shall "
-            "not be tested against each other are named by ignored_pairs"
+            f"features: empty, so nothing would be tested; name {' or '.join(FEATURES)}, or both; to leave out "
+            "pairs of meshes use ignored_pairs"
         )
     return tuple(name for name in FEATURES if name in settings["features"])
 
@@ -168,7 +168,7 @@ def check_stop(settings: dict[str, Any], builder: SceneBuilder) -> None:
 def _check_rigid(name: str, values: dict[str, Any], settings: dict[str, Any]) -> None:
     moved = f"mesh.{name}.input: {values['input']}"
     if values["static"]:
-        raise ParameterError(f"{moved} moves a mesh, mesh.{name}.static says that it does not move; leave one out")
+        raise ParameterError(f"{moved} moves the mesh, and mesh.{name}.static: true fixes it; leave one out")
     if values["transform"] == "pose":
         raise ParameterError(
             f"mesh.{name}.transform: pose is for vertices that are sent in each frame; of a mesh that moves by poses "

@@ -9,7 +9,7 @@ import difflib
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from hpccd_ros.base.quoting import listed, shortened, suggestion
+from hpccd_ros.base.quoting import counted, listed, shortened, suggestion
 from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS, PAIRS, ROBOT, ROBOT_ROWS, STOP_ROWS, Row
 from hpccd_ros.params.values import ParameterError
 
@@ -41,7 +41,7 @@ def check(unknown: Iterable[str], settings: dict[str, Any]) -> list[str]:
         else:
             foreign.append(name)
     if problems:
-        more = f"; {len(problems) - _MOST} more are unknown" if len(problems) > _MOST else ""
+        more = f"; {counted(len(problems) - _MOST, 'more unknown name')}" if len(problems) > _MOST else ""
         raise ParameterError(f"{'; '.join(problems[:_MOST])}{more}")
     return foreign
 

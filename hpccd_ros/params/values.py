@@ -20,7 +20,7 @@ def unusable_value(row: Row, value: Any) -> str | None:
     if row.span is not None and not row.span[0] <= value <= row.span[1]:
         return f"{row.name}: {value} is outside {row.span[0]} .. {row.span[1]}"
     if row.least and 0 < value < row.least:
-        return f"{row.name}: {value} is neither 0 nor at least {row.least:g}"
+        return f"{row.name}: {value} is not valid; use 0, or at least {row.least:g}"
     entries = value if row.kind == "string[]" else [value]
     if row.choices:
         for entry in entries:
@@ -116,9 +116,11 @@ def check_names(settings: dict[str, Any]) -> None:
                     "letter first"
                 )
         if len(set(names)) != len(names):
-            raise ParameterError(f"{parameter}: names must differ, {quoting.repeated(names)} is there twice")
+            raise ParameterError(
+                f"{parameter}: names must differ, {quoting.repeated(names)} is listed twice; use each name once"
+            )
     if both := sorted(set(settings["meshes"]) & set(settings["robots"])):
-        raise ParameterError(f"robots: {quoting.listed(both)} is a mesh, too (parameter meshes); call it otherwise")
+        raise ParameterError(f"robots: {quoting.listed(both)} is also in the parameter meshes; choose another name")
 
 
 def pair_names(given: Iterable[str]) -> list[str]:

@@ -11,6 +11,7 @@ from rclpy.executors import SingleThreadedExecutor
 
 from hpccd_ros.bag.writer import BagWriter
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import counted
 from hpccd_ros.middleware import environment, ros_start, stop_signals, topic_names
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.params import node_parameters
@@ -47,7 +48,7 @@ def _record_until(stop, target, args) -> int:
 def _record(node, target, args, stop) -> int:
     parameters = node_parameters.fetch(node, args.node, args.wait, stop)
     if not parameters.get("meshes") and not parameters.get("robots"):
-        raise UserError(f"the node {args.node} has no parameter `meshes`, nor `robots`: is it an hpccd node?")
+        raise UserError(f"--node {args.node}: it has neither meshes nor robots; name an hpccd node that has some")
     wanted = recorded_topics.of_node(parameters)
     wanted += [topic for topic in map(_extra, args.topic) if topic.name not in {known.name for known in wanted}]
     files, missing = attachments.files(parameters)
@@ -94,7 +95,10 @@ def _spin(node, recorder, bag, contacts, args, stop, missing):
         if not ready and recorder.publishers(contacts):
             ready = True
             # Read by programs that start a recorder and must not publish before it subscribes.
-            print(f"recording {args.node} into {bag.path}: {len(recorder.topics)} topics, Ctrl-C ends", flush=True)
+            print(
+                f"recording {args.node} into {bag.path}: {counted(len(recorder.topics), 'topic')}, Ctrl-C ends",
+                flush=True,
+            )
         status.update()
         if not warned and time.monotonic() >= look + LOOK_EVERY:
             look = time.monotonic()
@@ -125,8 +129,8 @@ class Status:
             self._next += self.PERIOD
             lost = sum(self._recorder.lost.values())
             print(
-                f"\r{self._bag.message_count} messages, {self._recorder.received[self._contacts]} of contacts, "
-                f"{self._bag.size / 1e6:.1f} MB, {lost} lost"
+                f"\r{counted(self._bag.message_count, 'message')}, "
+                f"{self._recorder.received[self._contacts]} of contacts, {self._bag.size / 1e6:.1f} MB, {lost} lost"
                 + (
                     f", {self._bag.not_written.total()} NOT WRITTEN ({self._bag.last_error})"
                     if self._bag.failing
@@ -147,7 +151,9 @@ def _report(bag, recorder, missing):
     for name, count in recorder.received.items():
         if count:
             lost = recorder.lost.get(name, 0)
-            print(f"  {name}: {count} messages" + (f", {lost} LOST on the way to the recorder" if lost else ""))
+            print(
+                f"  {name}: {counted(count, 'message')}" + (f", {lost} LOST on the way to the recorder" if lost else "")
+            )
     for text in missing:
         print(f"  {text}")
     files = bag.file_paths
@@ -155,11 +161,11 @@ def _report(bag, recorder, missing):
         print(f"  {path} ends early, without index: `hpccd doctor {path} --recover OUT.mcap`")
     if bag.write_errors:
         print(
-            f"  {bag.not_written.total()} messages NOT WRITTEN, {bag.write_errors} write errors, the last: "
-            f"{bag.last_error}"
+            f"  {counted(bag.not_written.total(), 'message')} NOT WRITTEN, {counted(bag.write_errors, 'write error')}, "
+            f"the last: {bag.last_error}"
         )
-    where = str(files[0]) if len(files) == 1 else f"{len(files)} files in {bag.path}"
-    print(f"recorded {bag.message_count} messages, {bag.size / 1e6:.2f} MB: {where}", flush=True)
+    where = str(files[0]) if len(files) == 1 else f"{counted(len(files), 'file')} in {bag.path}"
+    print(f"recorded {counted(bag.message_count, 'message')}, {bag.size / 1e6:.2f} MB: {where}", flush=True)
 
 
 def _extra(text) -> Wanted:

@@ -10,7 +10,7 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from hpccd_ros.base.quoting import listed, quoted
+from hpccd_ros.base.quoting import counted, listed, quoted
 from hpccd_ros.frames.samples import Run, Samples
 from hpccd_ros.frames.types import ALWAYS, UNKNOWN_TIME
 from hpccd_ros.robots.errors import RobotError
@@ -33,7 +33,8 @@ def check_lengths(names: Sequence[str], positions: Sequence[float]) -> None:
     """Raises RobotError if the message is malformed. A joint state without positions has only velocities or efforts."""
     if len(positions) not in (0, len(names)):
         raise RobotError(
-            f"joint states: {len(names)} names and {len(positions)} positions; each joint needs one of both"
+            f"joint states: {counted(len(names), 'name')} and {counted(len(positions), 'position')}; each joint needs "
+            "one of both"
         )
     if len(set(names)) < len(names):
         twice = next(name for at, name in enumerate(names) if name in names[:at])

@@ -44,7 +44,7 @@ def test_what_no_robot_can_use_is_refused_before_any_is_known():
     assert joint_messages.fill([], message, "joint_states") == []
     message.position = message.position[:1]
     (refusal,) = joint_messages.fill([], message, "joint_states")
-    assert "2 names and 1 positions" in refusal.text
+    assert "2 names and 1 position" in refusal.text
     message = crane.joint_state(1, 1)
     message.header.stamp.sec = -1
     (refusal,) = joint_messages.fill([], message, "joint_states")

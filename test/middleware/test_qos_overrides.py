@@ -94,7 +94,7 @@ def test_the_recording_hears_what_the_node_hears(start_node, tmp_path):
         node.peer.vertices("cloth", sheet_positions(N, k), k)
         node.wait_until(lambda k=k: len(heard) >= k, f"answer {k}")
     assert node.stop() == 0
-    recorded = int(re.search(r"recorded (\d+) messages", node.output())[1])
+    recorded = int(re.search(r"recorded ([\d,]+) messages", node.output())[1].replace(",", ""))
     assert recorded >= 8, "a topology, four frames, three answers"
     done = subprocess.run(
         [sys.executable, "-m", "hpccd_ros.cli", "replay", str(bag)], capture_output=True, text=True, timeout=PATIENCE

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Security: the shipped policy covers what the node does; where security is demanded but cannot be had, none runs."""
+"""Security: the shipped policy covers what the node does; where security is required but not available, none runs."""
 
 import importlib.metadata
 import os
@@ -142,7 +142,7 @@ def test_without_security_plugins_no_node_runs(keystore, strategy):
     status, output = run_secured(strategy, str(keystore), "hpccd_ros.node", "--ros-args", "--enclave", ENCLAVE)
     assert status == 3, output
     assert "Found security directory" in output, "the keystore is whole: only the plugins are missing"
-    assert "cannot be had, so nothing is started" in output and "built without security" in output
+    assert "not available, so nothing is started" in output and "built without security" in output
     assert "Traceback" not in output
 
 

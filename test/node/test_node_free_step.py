@@ -170,7 +170,7 @@ NAN_VERTEX.start[1].vertices_f64[4] = math.nan
         (changed(time_limit=math.inf), "time_limit: inf must be positive and finite"),
         (changed(start=[]), "start: 0 entries for 2 meshes (lower, upper)"),
         (changed(end=[]), "end: 0 entries for 2 meshes (lower, upper)"),
-        (changed(mesh_names=["lower"]), "topologies: 2 entries for 1 meshes"),
+        (changed(mesh_names=["lower"]), "topologies: 2 entries for 1 mesh"),
         (NAN_VERTEX, "start[1] (upper): vertex 1 is"),
     ],
     ids="report any distance nan-separation separation query accuracy limit start end names nan".split(),

@@ -288,10 +288,10 @@ def test_values_of_a_type_that_does_not_exist_are_refused(start_node):
     bad.value.type = 77
     results = call(node, SetParameters, "set_parameters", SetParameters.Request(parameters=[bad, good])).results
     assert [result.successful for result in results] == [False, True]
-    assert "accuracy: 77 is no type" in results[0].reason
+    assert "accuracy: type 77 is not valid; use one of" in results[0].reason
     request = SetParametersAtomically.Request(parameters=[good, bad])
     result = call(node, SetParametersAtomically, "set_parameters_atomically", request).result
-    assert not result.successful and "accuracy: 77 is no type" in result.reason
+    assert not result.successful and "accuracy: type 77 is not valid; use one of" in result.reason
     assert node.stop() == 0 and "Traceback" not in node.output()
 
 

@@ -149,7 +149,7 @@ def test_streamed_recorded_and_verified(start_node, tmp_path, by):
     publisher.publish(stamped(10) if by == "pose" else transform(10))
     node.peer.vertices("cloth", sheet_positions(N, 10), stamp=10, frame_id="world")
     assert assert_answer(node.contacts(9)[-1], 10, 1e-9) > 0
-    warned = "1 steps with a motion beyond rigid_tolerance: blade was up to "
+    warned = "1 step with a motion beyond rigid_tolerance: blade was up to "
     node.wait_until(lambda: node.peer.statuses["detection"][1].startswith(warned), warned)
     assert node.peer.statuses["detection"][2]["coarse"] == "1"
     assert node.stop() == 0

@@ -149,7 +149,7 @@ IMPOSSIBLE = {
     "long name": ("{folder}/" + "x" * 300 + ".mcap", "255 bytes"),
     "name without room for a number": ("{folder}/" + "x" * 250, "255 bytes"),
     "long folder": ("{folder}/" + "x" * 300 + "/run.mcap", "File name too long"),
-    "levels": ("{folder}/" + "d/" * 2000 + "run.mcap", "2000 folders are missing"),
+    "levels": ("{folder}/" + "d/" * 2000 + "run.mcap", "2,000 missing folders on the way"),
     "long path": ("{folder}/" + ("d" * 200 + "/") * 30 + "run.mcap", "File name too long"),
     "nul": ("{folder}/a\0b.mcap", "null"),
     "no text": ("{folder}/\udc80\ud800.mcap", "surrogates"),

@@ -436,7 +436,7 @@ def test_joint_states_that_cannot_be_used_are_told_of_before_the_robot_is_known(
     joints.publish(short)
     values = node.frames_status(joint_states_refused=1)
     assert (
-        values["last_refusal"] == "joint_states: malformed: joint states: 2 names and 1 positions; each joint "
+        values["last_refusal"] == "joint_states: malformed: joint states: 2 names and 1 position; each joint "
         "needs one of both"
     )
     joints.publish(JointState(name=[f"j{k}" for k in range(1001)], position=[0.0] * 1001))

@@ -123,7 +123,7 @@ def test_a_stream_of_shapes_within_a_room_of_one(start_node, tmp_path):
     wrong.triangles[3].vertex_indices[1] = N * N
     send(node, "shape", wrong)
     values = node.frames_status(dropped__cloth__index_range=1)
-    assert f"triangle 3 names vertex {N * N}, there are {N * N} vertices" in values["last_refusal"]
+    assert f"triangle 3 names vertex {N * N}, the mesh has {N * N} vertices" in values["last_refusal"]
     assert node.stop() == 0
     replay, _ = replayed(path)
     assert (replay.verified, replay.diverged, replay.unverified) == (3, 0, 0)

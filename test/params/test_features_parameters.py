@@ -34,7 +34,7 @@ def test_what_the_core_is_told():
     "given, text",
     [
         ({"features": []}, "features: empty, so nothing would be tested; name vertex_face or edge_edge, or both"),
-        ({"features": [""]}, "are named by ignored_pairs"),
+        ({"features": [""]}, "to leave out pairs of meshes use ignored_pairs"),
         ({"features": ["faces"]}, "features: 'faces' is not valid; use one of vertex_face, edge_edge"),
         ({"features": "vertex_face"}, "features: 'vertex_face' is of the wrong type; expected string[]"),
         ({"pair_features": ["robot:cloth"]}, "pair_features: 'robot:cloth' must be NAME:NAME:KIND with"),

@@ -87,7 +87,7 @@ PAIR = {"a.meshes": ["robot", "cloth"]}
         (
             {"a.meshes": ["cloth", "cloth"], "a.ignored": True},
             {},
-            "pairs.a.ignored: both meshes of the pair are cloth; whether a mesh is tested against itself is said by "
+            "pairs.a.ignored: both meshes of the pair are cloth; to switch off tests within a mesh set "
             "mesh.cloth.self_collision",
         ),
         (
@@ -135,7 +135,7 @@ def separations(*entries):
 @pytest.mark.parametrize("entries", [("arm:left/hand:0.1", "arm/hand:left:0.2"), ("arm:arm/hand:0.1", "arm/a:arm:0.2")])
 def test_what_is_said_of_two_links_by_their_robots_may_not_differ(entries):
     for order in (entries, entries[::-1]):
-        with pytest.raises(ParameterError, match="contradicts 'ar.*say of these two links what holds"):
+        with pytest.raises(ParameterError, match="contradicts 'ar.*give these two links a value of their own"):
             separations(*order)
     pair = ("arm/hand", "left/hand") if "left" in entries[0] else ("arm/a", "arm/hand")
     assert separations(f"{':'.join(pair)}:0.3", *entries)[frozenset(pair)] == 0.3

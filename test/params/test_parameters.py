@@ -90,8 +90,8 @@ def test_overrides_reach_the_settings(node_with):
         ({"accuracy": "sloppy"}, "accuracy: 'sloppy' is not valid; use one of fast, balanced"),
         ({"outputs": ["points", "colours"]}, "outputs: 'colours' is not valid; use one of"),
         ({"threads": -1}, "threads"),
-        ({"record_split_size": 1e-6}, "record_split_size: 1e-06 is neither 0 nor at least 0.01"),
-        ({"record_split_time": 1e-9}, "record_split_time: 1e-09 is neither 0 nor at least 0.1"),
+        ({"record_split_size": 1e-6}, "record_split_size: 1e-06 is not valid; use 0, or at least 0.01"),
+        ({"record_split_time": 1e-9}, "record_split_time: 1e-09 is not valid; use 0, or at least 0.1"),
         ({"threads": "many"}, "threads"),
         ({"stamp_tolerance": True}, "stamp_tolerance"),
         ({"stamp_tolerance": -1}, "stamp_tolerance"),
@@ -157,7 +157,7 @@ def test_changes_at_run_time(node_with):
         "mesh.a.static": (True, "mesh.a.static: read-only while"),
         "meshes": (["b"], "read-only"),
         "threads": (-4, "range"),
-        "record_split_size": (1e-6, "neither 0 nor at least"),
+        "record_split_size": (1e-6, "use 0, or at least"),
     }
     for name, (value, reason) in refusals.items():
         result = change(name, value)

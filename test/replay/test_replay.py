@@ -250,7 +250,7 @@ def test_recording_of_another_recorder_needs_parameters(small_bag, tmp_path, hpc
     assert wrong.returncode == 2 and "has no vertices of the meshes shirt" in wrong.stderr
     (tmp_path / "bad.yaml").write_text("- a list")
     bad = hpccd("replay", path, "--params", "bad.yaml")
-    assert bad.returncode == 2 and "no ROS parameter file" in bad.stderr
+    assert bad.returncode == 2 and "not a ROS parameter file" in bad.stderr
 
 
 def test_wrong_scene_parameters_diverge(small_bag, tmp_path):

@@ -68,7 +68,7 @@ def test_a_publisher_that_gives_no_stamps_is_told_of():
 
 def test_messages_that_cannot_be_used_leave_nothing_behind():
     joints = history()
-    with pytest.raises(RobotError, match="2 names and 1 positions"):
+    with pytest.raises(RobotError, match="2 names and 1 position"):
         joints.add(1, ["turn", "slide"], [0.0])
     with pytest.raises(NoJointStateError):
         joints.latest()

@@ -68,8 +68,8 @@ def bad_index(r):
 BAD = [
     (request(names=("ghost",), topologies=False), "unknown mesh 'ghost'"),
     (request(names=("a", "a")), "names must differ"),
-    (changed(many_names), "1001 meshes, at most 1000 are taken (parameter max_meshes)"),
-    (changed(cut_end), "end: 0 entries for 1 meshes"),
+    (changed(many_names), "1,001 meshes, at most 1000 are taken (parameter max_meshes)"),
+    (changed(cut_end), "end: 0 entries for 1 mesh"),
     (changed(cut_vertices), "end[0] (cloth): 255 vertices, the topology has 256"),
     (changed(put_nan), "start[0] (cloth): vertex 1 is"),
     (changed(put_far), "end[0] (cloth): vertex 7 is"),

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Mistakes that users make with the commands: each is answered in one line, with the problem and its remedy."""
+
+import pytest
+
+from hpccd_ros import cli
+
+# Arguments -> a part of the line; BAG stands for a sound recording, PARAMS for a file with a misspelt parameter.
+MISTAKES = {
+    ("record", "--node", "hpccd"): "--node hpccd: give the full name with its namespace, for example /hpccd",
+    ("record", "--duration", "-1"): "--duration -1.0: must not be negative",
+    ("record", "--split-size", "1e-6"): "--split-size 1e-06: must be 0 or at least 0.01",
+    ("record", "--wait", "0", "--node", "/nobody/hpccd"): "no node /nobody/hpccd found on ROS_DOMAIN_ID ",
+    ("record", "--wait", "0", "--topic", "/joints"): "no node /hpccd found on ROS_DOMAIN_ID ",
+    ("replay", "nothing.mcap"): "nothing.mcap does not exist",
+    ("replay", "BAG", "--accuracy", "exakt"): "exakt",
+    ("replay", "BAG", "--params", "PARAMS"): "stop_distanse: no such parameter; ",
+    ("replay", "BAG", "--from", "5", "--to", "2"): "--to not before --from",
+    ("view", "BAG", "--every", "0"): "--every 0: must be at least 1",
+    ("view", "BAG", "--elevation", "100"): "--elevation 100.0: must lie between -89.9 and 89.9 degrees",
+    ("cut", "BAG", "-o", "part.mcap"): "nothing to cut: give --from TIME, --to TIME or both",
+    ("cut", "BAG", "--to", "1", "-o", "part"): "-o part: must end in .mcap",
+    ("cut", "BAG", "--from", "9 s", "-o", "part.mcap"): "--from: '9 s' is not a time; give seconds from the beginning",
+    ("doctor", "nothing.mcap"): "nothing.mcap does not exist",
+    ("scene", "cloth-dorp"): "unknown scene 'cloth-dorp'",
+    ("scene", "two-triangles", "--mcap", "run.bag"): "--mcap run.bag: name a file that ends in .mcap",
+    ("scene", "two-triangles", "--loop"): "--loop belongs to --publish",
+    ("scene", "two-triangles", "--npz", "x.npz", "--step", "99"): "--step 99: the scene has steps 1 to ",
+    ("status", "--wait", "-1"): "--wait -1.0: must be a number of seconds, not negative",
+    ("status", "/nobody/hpccd", "--wait", "0"): "no node /nobody/hpccd found on ROS_DOMAIN_ID ",
+    ("echo", "/contact", "--wait", "0.1"): "/contact: no such topic on ROS_DOMAIN_ID ",
+    ("echo", "meshes/my cloth/vertices"): "'meshes/my cloth/vertices': not a topic name; write it as /contacts or ",
+    ("echo", "/contacts", "-n", "0"): "-n 0: must be at least 1",
+    ("param", "get"): "get: got no NAME; write hpccd param get NAME",
+    ("param", "set", "accuracy"): "set: got accuracy; write hpccd param set NAME VALUE",
+    ("param", "list", "accuracy", "fast"): "list: got accuracy fast; write hpccd param list [NAME]",
+    ("param", "list", "--node", "/nobody/hpccd", "--wait", "0"): "no node /nobody/hpccd found on ROS_DOMAIN_ID ",
+}
+# Arguments -> a part of what argparse says below the usage.
+OF_OPTIONS = {
+    ("rekord",): "invalid choice: 'rekord'",
+    ("replay",): "the following arguments are required: FILE",
+    ("replay", "a.mcap", "--rte", "2"): "unrecognized arguments: --rte",
+    ("scene", "--size", "big"): "argument --size: invalid float value: 'big'",
+    ("record", "--compression", "gzip"): "invalid choice: 'gzip'",
+    ("view", "a.mcap", "--step", "1", "--every", "2"): "not allowed with argument",
+    ("echo",): "the following arguments are required: TOPIC",
+    ("param", "put", "accuracy", "fast"): "invalid choice: 'put'",
+}
+
+
+@pytest.mark.parametrize("arguments", MISTAKES, ids=" ".join)
+def test_mistake(arguments, hpccd, small_bag, tmp_path):
+    params = tmp_path / "node.yaml"
+    params.write_text("/**:\n  ros__parameters:\n    meshes: [cloth, ball]\n    stop_distanse: 0.1\n")
+    places = {"BAG": str(small_bag), "PARAMS": str(params)}
+    done = hpccd(*(places.get(word, word) for word in arguments))
+    assert done.returncode == 2 and MISTAKES[arguments] in done.stderr, done
+    assert done.stderr.startswith(f"hpccd {arguments[0]}: ") and done.stderr.count("\n") == 1
+    assert done.stdout == "" or arguments[0] == "scene"
+
+
+@pytest.mark.parametrize("arguments", OF_OPTIONS, ids=" ".join)
+def test_mistake_of_options(arguments, capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(list(arguments))
+    shown = capsys.readouterr().err
+    assert ended.value.code == 2 and OF_OPTIONS[arguments] in shown and shown.startswith("usage: hpccd")
