@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a process of your own needs to send meshes to the node and to read its contacts; the one public part of
-hpccd_ros.
+"""Send meshes to the node and read its contacts: the public part of hpccd_ros.
 
-Call :func:`prepare_environment` before ``rclpy.init()``. The QoS profiles are those that fit the node's defaults.
-Lengths are in the unit of the scene, whatever that is; stamps are in nanoseconds since the epoch; a time of contact is
-a fraction of its step, from 0 (its start) to 1 (its end).
+Call :func:`prepare_environment` before ``rclpy.init()``. The QoS profiles fit the node's defaults. Lengths are in the
+unit of the scene; a time of impact is a fraction of its step, from 0 (start) to 1 (end). A stamp is a Time, or
+nanoseconds since the epoch.
 
-    >>> from hpccd_ros import client
-    >>> client.vertices_topic("cloth")
-    'meshes/cloth/vertices'
+Examples
+--------
+>>> from hpccd_ros import client
+>>> client.vertices_topic("cloth")
+'meshes/cloth/vertices'
 """
 
 from hpccd_ros.client.contacts import ContactArrays, contacts_from_message, pair_summary, scene_contacts

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The contacts of a step: the node's message to numpy arrays, numbered within each mesh or across the scene; and pairs
-of meshes in brief."""
+"""Contacts and pair summaries of the node as numpy arrays and single messages."""
+
+from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +10,7 @@ import numpy as np
 from hpccd.msg import ContactArray, PairSummary, PairSummaryArray
 from numpy.typing import NDArray
 
+from hpccd_ros.client.names import belongs, check
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import Separation
 from hpccd_ros.middleware import answer_fields, contact_messages
@@ -34,29 +36,43 @@ def meshes_of(message: Any, name: str, count: int) -> NDArray[np.uint32]:
 
 @dataclass(frozen=True, eq=False)
 class ContactArrays:
-    """The N contacts of one message in their canonical order; features are numbered within their mesh.
+    """The N contacts of one message in canonical order; features are numbered within their mesh.
 
-    mesh_names: of the scene. n_vertex_face, n_edge_edge, n_edge_face: number of contacts, in this order, of each
-    kind; edge-face ones are told only by ``~/detect``, for query ``intersections``.
-    mesh_a, mesh_b: (N,) uint32, indices into mesh_names: the mesh of each side.
-    features_a: (N, 2) uint32, of mesh_a: vertex and ``ContactArray.NONE``, or the two vertices of the edge.
-    features_b: (N, 2) uint32, of mesh_b: face and ``ContactArray.NONE``, or the two vertices of the edge.
-    toc: (N,) float64, time of contact as a fraction of the step, 0 .. 1; (0,) in answers of one snapshot.
-    points: (N, 3) float64, where the sides meet at toc, in the unit of the scene; with a separation the middle between
-    their nearest points.
-    normals: (N, 3) float64, of length one: from the face to the vertex, or from edge a to edge b; zero where there is
-    no such side (ContactArray.msg tells when).
-    closest: (N, 2, 3) float64, the nearest points of both sides at toc, in the unit of the scene.
-    distance: (N,) float64, how far apart the sides are, in the unit of the scene: in answers to query ``proximity``,
-    else (0,).
-    minimum_separation: in force in the whole scene, in its unit; 0 where contacts touch. pair_separation: for the pairs
-    of meshes that have one of their own, by their names in the order of the scene.
-    features: what was tested at all: "vertex_face", "edge_edge" or both, but for pairs of meshes of which the node
-    tests other ones (its parameter ``pair_features``).
-    parts: into how many the step was cut, because meshes move by poses; 0 where none does. motion_bounds: (K,) float64,
-    for each of mesh_names how far it may have been from its motion, or (0,); what that means is in ContactArray.msg.
-    points, normals and closest are (0, 3) and (0, 2, 3) where the node does not send them (its parameter ``outputs``).
-    All are views of the message, which they keep alive.
+    All arrays are views of the message. `points`, `normals` and `closest` are (0, 3) and (0, 2, 3) if the node does not
+    send them (its parameter ``outputs``).
+
+    Attributes
+    ----------
+    mesh_names : tuple of str
+        Meshes of the scene.
+    n_vertex_face, n_edge_edge, n_edge_face : int
+        Number of contacts of each kind, in this order. Edge-face ones only answer the query ``intersections``.
+    mesh_a, mesh_b : ndarray, shape (N,), uint32
+        The mesh of each side: indices into `mesh_names`.
+    features_a : ndarray, shape (N, 2), uint32
+        Side a, of `mesh_a`: vertex and ``ContactArray.NONE``, or both vertices of the edge.
+    features_b : ndarray, shape (N, 2), uint32
+        Side b, of `mesh_b`: face and ``ContactArray.NONE``, or both vertices of the edge.
+    toc : ndarray, shape (N,), float64
+        Time of impact as a fraction of the step in [0, 1]; (0,) in responses about one snapshot.
+    points : ndarray, shape (N, 3), float64
+        Where the sides touch at their time of impact, in the unit of the scene.
+    normals : ndarray, shape (N, 3), float64
+        Unit vectors from the face to the vertex, or from edge a to edge b; zero if no side is defined.
+    closest : ndarray, shape (N, 2, 3), float64
+        Nearest points of both sides at their time of impact, in the unit of the scene.
+    distance : ndarray, shape (N,), float64
+        Distance of the sides, in the unit of the scene, in responses to the query ``proximity``; otherwise (0,).
+    minimum_separation : float
+        In force in the whole scene, in its unit; 0 for contact.
+    pair_separation : dict of (str, str) to float
+        Separation of pairs of meshes that have one of their own.
+    features : tuple of str
+        What was tested: "vertex_face", "edge_edge" or both, unless a pair of meshes has its own ``pair_features``.
+    parts : int
+        Number of parts of the step if meshes move by poses, otherwise 0.
+    motion_bounds : ndarray, shape (K,) or (0,), float64
+        Upper bound on the deviation of each mesh from its true motion, see ContactArray.msg.
     """
 
     mesh_names: tuple[str, ...]
@@ -87,9 +103,21 @@ _OPTIONAL: dict[str, tuple[int, ...]] = {"points": (3,), "normals": (3,), "close
 
 
 def contacts_from_message(message: ContactArray) -> ContactArrays:
-    """The arrays of a message in their shapes. Of a step's contacts they are the earliest where ``message.truncated``.
+    """The contacts of a message as arrays.
 
-    Raises ValueError where the arrays of the message do not fit together, which those of the node always do.
+    Parameters
+    ----------
+    message : hpccd.msg.ContactArray
+
+    Returns
+    -------
+    ContactArrays
+        The earliest contacts if ``message.truncated``.
+
+    Raises
+    ------
+    ValueError
+        If the arrays of the message are inconsistent; those of the node never are.
     """
     kind = np.frombuffer(message.kind, np.uint8)
     if (kind > ContactArray.EDGE_FACE).any() or (kind[1:] < kind[:-1]).any():
@@ -130,14 +158,25 @@ def _separation_of(message: ContactArray) -> Separation:
 
 
 def scene_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
-    """The contacts with features numbered across the scene: as ``hpccd_core.Contacts`` has them, and in its order.
+    """The contacts of a message with features numbered across the scene, as in ``hpccd_core.Contacts``.
 
-    layout: ``Layout.of(mesh_names, topologies)`` of the meshes in the order of ``message.mesh_names``.
-    Returns ``vf`` (N, 2) uint32, vertex and face; ``vf_toc`` (N,) float64; ``ee`` (M, 4) uint32, two edges by their
-    vertices; ``ee_toc`` (M,) float64; ``points`` and ``normals`` (N+M, 3) float64, or (0, 3) where not sent;
-    ``closest`` (N+M, 2, 3) float64, or (0, 2, 3). Of query ``proximity`` ``vf_distance`` (N,) and ``ee_distance`` (M,)
-    take the place of the times; of query ``intersections`` there is only ``ef`` (K, 3) uint32, edge and face.
-    Raises ValueError where the layout is of other meshes or of other versions of their topologies than the message.
+    Parameters
+    ----------
+    message : hpccd.msg.ContactArray
+    layout : Layout
+        ``Layout.of(mesh_names, topologies)`` of the meshes in the order of ``message.mesh_names``.
+
+    Returns
+    -------
+    SceneContacts
+        ``vf`` (N, 2), ``vf_toc`` (N,), ``ee`` (M, 4), ``ee_toc`` (M,), ``points``, ``normals`` and ``closest``.
+        Responses to ``proximity`` have ``vf_distance`` and ``ee_distance`` instead of times, those to
+        ``intersections`` only ``ef`` (K, 3).
+
+    Raises
+    ------
+    ValueError
+        If the layout is of other meshes, or of other versions of their topologies.
     """
     contacts = contacts_from_message(message)
     if contacts.mesh_names != layout.mesh_names:
@@ -149,12 +188,54 @@ def scene_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
 
 
 def pair_summary(message: PairSummaryArray, mesh_a: str, mesh_b: str) -> PairSummary:
-    """That of two meshes, whichever comes first; of one mesh: its name twice.
+    """The summary of two meshes, of a robot and a mesh, or of two robots.
 
-    Raises ValueError where they are not tested against each other, or there are no such meshes.
+    Parameters
+    ----------
+    message : hpccd.msg.PairSummaryArray
+        From the topic ``PAIRS_TOPIC``.
+    mesh_a, mesh_b : str
+        Names in either order: of a mesh, of a link (``"arm/hand"``), or of a robot (``"arm"``: all of its links). The
+        same name twice: within that mesh or robot.
+
+    Returns
+    -------
+    hpccd.msg.PairSummary
+        For several pairs of links: the sum of their contacts, the earliest time of impact and the smallest distance,
+        which is NaN if that of a pair is unknown.
+
+    Raises
+    ------
+    ValueError
+        If there is no such mesh or robot, or its pairs are not tested.
+
+    Examples
+    --------
+    >>> from hpccd.msg import PairSummary, PairSummaryArray
+    >>> from hpccd_ros import client
+    >>> hand = PairSummary(mesh_a="arm/hand", mesh_b="cloth", count=2, first_toc=0.25, distance=0.0)
+    >>> elbow = PairSummary(mesh_a="arm/elbow", mesh_b="cloth", count=1, first_toc=0.75, distance=0.5)
+    >>> summary = client.pair_summary(PairSummaryArray(pairs=[hand, elbow]), "cloth", "arm")
+    >>> summary.mesh_a, summary.count, summary.first_toc, summary.distance
+    ('arm', 3, 0.25, 0.0)
     """
-    for pair in message.pairs:
-        if {pair.mesh_a, pair.mesh_b} == {mesh_a, mesh_b}:
-            return pair
-    there = ", ".join(f"{pair.mesh_a} and {pair.mesh_b}" for pair in message.pairs) or "none"
-    raise ValueError(f"mesh_a, mesh_b: {mesh_a!r} and {mesh_b!r} are no pair that is tested; there are {there}")
+    for argument, name in (("mesh_a", mesh_a), ("mesh_b", mesh_b)):
+        check(argument, name, (mesh for pair in message.pairs for mesh in (pair.mesh_a, pair.mesh_b)))
+    as_given = [pair for pair in message.pairs if belongs(pair.mesh_a, mesh_a) and belongs(pair.mesh_b, mesh_b)]
+    other_way = [pair for pair in message.pairs if belongs(pair.mesh_a, mesh_b) and belongs(pair.mesh_b, mesh_a)]
+    found = as_given if mesh_a == mesh_b else as_given + other_way
+    if not found:
+        there = ", ".join(f"{pair.mesh_a} and {pair.mesh_b}" for pair in message.pairs)
+        raise ValueError(
+            f"mesh_a, mesh_b: {mesh_a!r} and {mesh_b!r} are no pair that is tested; the tested pairs are {there}"
+        )
+    if len(found) == 1 and {found[0].mesh_a, found[0].mesh_b} == {mesh_a, mesh_b}:
+        return found[0]
+    first, second = (mesh_a, mesh_b) if as_given else (mesh_b, mesh_a)
+    return PairSummary(
+        mesh_a=first,
+        mesh_b=second,
+        count=sum(pair.count for pair in found),
+        first_toc=min(pair.first_toc for pair in found),
+        distance=float(np.min([pair.distance for pair in found])),  # NaN if one of them is
+    )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The smallest distance of each pair of meshes: the node's message to numpy arrays."""
+"""Smallest distances of pairs of meshes: the node's message as numpy arrays."""
+
+from __future__ import annotations
 
 import math
 from dataclasses import dataclass
@@ -9,24 +11,35 @@ from hpccd.msg import DistanceArray
 from numpy.typing import NDArray
 
 from hpccd_ros.client.contacts import field, meshes_of
+from hpccd_ros.client.names import belongs, check
 
 
 @dataclass(frozen=True, eq=False)
 class DistanceArrays:
-    """P pairs of meshes of one snapshot, in the order of the scene; a mesh with itself is a pair too. Features are
-    numbered within their mesh.
+    """The smallest distance of P pairs of meshes at one time; a mesh with itself is a pair too.
 
-    mesh_names: of the scene. distance: (P,) float64, in the unit of the scene; +inf where there are no two features.
-    kind: (P,) uint8, ``DistanceArray.VERTEX_FACE``, ``EDGE_EDGE``, ``EDGE_FACE`` (they intersect) or ``NO_PAIR``.
-    mesh_a, mesh_b: (P,) uint32, indices into mesh_names: the mesh of each side. The vertex of a vertex-face pair, and
-    the edge of an edge-face pair, is of mesh_a, whichever comes first in the scene.
-    features_a: (P, 2) uint32, of mesh_a: vertex and ``DistanceArray.NONE``, or the two vertices of the edge.
-    features_b: (P, 2) uint32, of mesh_b: face and ``DistanceArray.NONE``, or the two vertices of the edge.
-    points: (P, 2, 3) float64, the nearest points of both sides, in the unit of the scene.
-    direction: (P, 3) float64, unit vector from the nearest point of mesh_a to that of mesh_b; 0 where it is not known.
-    approach_speed: (P,) float64, by how much the distance became smaller in a second, on the mean of the time since the
-    snapshot before; > 0: nearing; NaN where it is not known.
-    All that the message has are views of it, which they keep alive.
+    Features are numbered within their mesh. Arrays are views of the message.
+
+    Attributes
+    ----------
+    mesh_names : tuple of str
+        Meshes of the scene.
+    distance : ndarray, shape (P,), float64
+        In the unit of the scene; +inf if no pair of features exists.
+    kind : ndarray, shape (P,), uint8
+        ``DistanceArray.VERTEX_FACE``, ``EDGE_EDGE``, ``EDGE_FACE`` (they intersect) or ``NO_PAIR``.
+    mesh_a, mesh_b : ndarray, shape (P,), uint32
+        The mesh of each side: indices into `mesh_names`. The vertex or edge that is near a face is of `mesh_a`.
+    features_a : ndarray, shape (P, 2), uint32
+        Side a, of `mesh_a`: vertex and ``DistanceArray.NONE``, or both vertices of the edge.
+    features_b : ndarray, shape (P, 2), uint32
+        Side b, of `mesh_b`: face and ``DistanceArray.NONE``, or both vertices of the edge.
+    points : ndarray, shape (P, 2, 3), float64
+        Nearest points of both sides, in the unit of the scene.
+    direction : ndarray, shape (P, 3), float64
+        Unit vector from the nearest point of `mesh_a` to that of `mesh_b`; 0 if unknown.
+    approach_speed : ndarray, shape (P,), float64
+        Decrease of the distance per second since the last snapshot; NaN if unknown.
     """
 
     mesh_names: tuple[str, ...]
@@ -44,24 +57,46 @@ class DistanceArrays:
         return len(self.distance)
 
     def between(self, mesh_a: str, mesh_b: str) -> float:
-        """The smallest distance of two meshes, or within one; +inf where they are not tested against each other.
+        """The smallest distance of two meshes, of a robot and a mesh, or of two robots.
 
-        Raises ValueError for a name that the scene does not have.
+        Parameters
+        ----------
+        mesh_a, mesh_b : str
+            Names in either order: of a mesh, of a link (``"arm/hand"``), or of a robot (``"arm"``: all of its links).
+            The same name twice: within that mesh or robot.
+
+        Returns
+        -------
+        float
+            In the unit of the scene; +inf if they are not tested against each other.
+
+        Raises
+        ------
+        ValueError
+            If there is no such mesh or robot.
         """
-        a, b = self._number("mesh_a", mesh_a), self._number("mesh_b", mesh_b)
-        wanted = ((self.mesh_a == a) & (self.mesh_b == b)) | ((self.mesh_a == b) & (self.mesh_b == a))
+        for argument, name in (("mesh_a", mesh_a), ("mesh_b", mesh_b)):
+            check(argument, name, self.mesh_names)
+        of_a, of_b = (np.array([belongs(mesh, name) for mesh in self.mesh_names]) for name in (mesh_a, mesh_b))
+        wanted = (of_a[self.mesh_a] & of_b[self.mesh_b]) | (of_b[self.mesh_a] & of_a[self.mesh_b])
         return float(self.distance[wanted].min(initial=math.inf))
-
-    def _number(self, argument: str, mesh: str) -> int:
-        if mesh not in self.mesh_names:
-            raise ValueError(f"{argument}: no mesh is named {mesh!r}; there are {', '.join(self.mesh_names)}")
-        return self.mesh_names.index(mesh)
 
 
 def distances_from_message(message: DistanceArray) -> DistanceArrays:
-    """The arrays of a message in their shapes.
+    """The distances of a message as arrays.
 
-    Raises ValueError where the arrays of the message do not fit together, which those of the node always do.
+    Parameters
+    ----------
+    message : hpccd.msg.DistanceArray
+
+    Returns
+    -------
+    DistanceArrays
+
+    Raises
+    ------
+    ValueError
+        If the arrays of the message are inconsistent; those of the node never are.
     """
     count = len(message.distance)
     n_directed = len(message.direction) or len(message.approach_speed)

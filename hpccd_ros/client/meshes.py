@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Faces and positions of a mesh: numpy arrays to messages, and back; those of shape_msgs/Mesh and of markers are
-numbered as by the node, whose contacts name their vertices and faces."""
+"""Faces and positions of a mesh: numpy arrays to messages, and back."""
+
+from __future__ import annotations
 
 from typing import Any
 
@@ -12,6 +13,7 @@ from shape_msgs.msg import Mesh
 from visualization_msgs.msg import Marker
 
 from hpccd_core import arguments
+from hpccd_ros.client.stamps import Stamp, nanoseconds
 from hpccd_ros.frames import coordinates
 from hpccd_ros.frames.types import Topology
 from hpccd_ros.frames.welding import Welding
@@ -19,19 +21,41 @@ from hpccd_ros.middleware import mesh_messages, whole_meshes
 
 _LARGEST_UINT32 = 2**32 - 1
 _LARGEST_UINT64 = 2**64 - 1
-# builtin_interfaces/Time counts seconds in 32 bits with a sign.
-_LAST_STAMP = 2**31 * 10**9 - 1
 
 
 def topology_message(
-    faces: ArrayLike, n_vertices: int, *, edges: ArrayLike = (), version: int = 0, stamp_ns: int = 0
+    faces: ArrayLike, n_vertices: int, *, edges: ArrayLike = (), version: int = 0, stamp_ns: Stamp = 0
 ) -> MeshTopology:
-    """The message that tells the node the triangles of a mesh: at the start, and again whenever they change.
+    """The message that gives the node the triangles of a mesh: at the start, and whenever they change.
 
-    faces: (F, 3) integers, indices into this mesh's own vertices. n_vertices: how many it has, more than the largest
-    index. edges: (E, 2) integers, edges beside those of the faces; a rope has no faces: ``()``. version: counts up with
-    each change; vertices name the version that they belong to. stamp_ns: when it came into force, ns since the epoch.
-    Raises TypeError or ValueError naming the argument.
+    Parameters
+    ----------
+    faces : ArrayLike, shape (F, 3), integers
+        Indices into this mesh's own vertices; ``()`` for a rope.
+    n_vertices : int
+        Number of vertices, more than the largest index.
+    edges : ArrayLike, shape (E, 2), integers
+        Segments beside the edges of the faces.
+    version : int
+        Increases with each change; vertices name the version they belong to.
+    stamp_ns : int, rclpy.time.Time or builtin_interfaces.msg.Time
+        When it takes effect. An int is nanoseconds since the epoch.
+
+    Returns
+    -------
+    hpccd.msg.MeshTopology
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument has the wrong type, shape or range.
+
+    Examples
+    --------
+    >>> from hpccd_ros import client
+    >>> message = client.topology_message([[0, 1, 2]], n_vertices=3)
+    >>> message.n_vertices, list(message.faces)
+    (3, [0, 1, 2])
     """
     triangles, segments = arguments.faces(faces), arguments.edges(edges)
     n_vertices = arguments.whole_number("n_vertices", n_vertices, 0, _LARGEST_UINT32)
@@ -46,20 +70,47 @@ def topology_message(
         n_vertices,
         edges=segments,
         version=arguments.whole_number("version", version, 0, _LARGEST_UINT32),
-        stamp_ns=arguments.whole_number("stamp_ns", stamp_ns, 0, _LAST_STAMP),
+        stamp_ns=nanoseconds("stamp_ns", stamp_ns),
     )
 
 
 def vertices_message(
-    vertices: NDArray[Any], stamp_ns: int, *, step: int = 0, topology_version: int = 0, frame_id: str = ""
+    vertices: NDArray[Any], stamp_ns: Stamp, *, step: int = 0, topology_version: int = 0, frame_id: str = ""
 ) -> MeshVertices:
-    """The message that tells the node where the vertices of a mesh are at one time.
+    """The message that gives the node the positions of a mesh at one time.
 
-    vertices: (n, 3) float32 or float64, sent in that precision; finite, not beyond 1e150, in the unit of the scene.
-    stamp_ns: the time of these positions, ns since the epoch; it grows from message to message, and is the same for all
-    meshes of a frame. step: a number of your own, handed through to ``ContactArray.step``. topology_version: that of
-    the :func:`topology_message` they belong to. frame_id: the coordinate frame of the positions.
-    Raises TypeError or ValueError naming the argument.
+    Parameters
+    ----------
+    vertices : ndarray, shape (n, 3), float32 or float64
+        Sent in that precision; finite, up to 1e150, in the unit of the scene.
+    stamp_ns : int, rclpy.time.Time or builtin_interfaces.msg.Time
+        The time of these positions: ``node.get_clock().now()``, the stamp of another message, or nanoseconds since the
+        epoch as an int. It increases from message to message, and is the same for all meshes of a frame. A float is
+        rejected; an int within ten seconds of the system's time in seconds is warned of.
+    step : int
+        A number of your own, copied to ``ContactArray.step``.
+    topology_version : int
+        Version of the :func:`topology_message` they belong to.
+    frame_id : str
+        Coordinate frame of the positions.
+
+    Returns
+    -------
+    hpccd.msg.MeshVertices
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument has the wrong type, shape or range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rclpy.time import Time
+    >>> from hpccd_ros import client
+    >>> message = client.vertices_message(np.zeros((3, 3)), Time(seconds=2.5))
+    >>> message.header.stamp.sec, message.header.stamp.nanosec
+    (2, 500000000)
     """
     arguments.refuse_masked("vertices", vertices)
     if not isinstance(vertices, np.ndarray) or vertices.dtype not in arguments.REALS:
@@ -73,7 +124,7 @@ def vertices_message(
         raise TypeError(f"frame_id: expected a string, got {type(frame_id).__name__}")
     return mesh_messages.vertices_message(
         vertices,
-        arguments.whole_number("stamp_ns", stamp_ns, 0, _LAST_STAMP),
+        nanoseconds("stamp_ns", stamp_ns),
         step=arguments.whole_number("step", step, 0, _LARGEST_UINT64),
         topology_version=arguments.whole_number("topology_version", topology_version, 0, _LARGEST_UINT32),
         frame_id=frame_id,
@@ -81,20 +132,42 @@ def vertices_message(
 
 
 def topology_from_message(message: MeshTopology) -> Topology:
-    """What is in a message: ``version``, ``n_vertices``, ``faces``, (F, 3) uint32, and ``edges``, (E, 2).
+    """The triangles of a message.
 
-    Both are views of the message, which they keep alive: to change one is to change the other.
-    Raises ValueError where faces are no triples, edges no pairs, or name a vertex that is not there.
+    Parameters
+    ----------
+    message : hpccd.msg.MeshTopology
+
+    Returns
+    -------
+    Topology
+        With ``version``, ``n_vertices``, ``faces`` (F, 3) and ``edges`` (E, 2), uint32: views of the message.
+
+    Raises
+    ------
+    ValueError
+        If faces are no triples, edges no pairs, or an index is out of range.
     """
     limits = dict.fromkeys(("max_vertices", "max_faces", "max_edges"), _LARGEST_UINT32)
     return mesh_messages.topology_from_message(message, limits)
 
 
 def vertices_from_message(message: MeshVertices) -> NDArray[Any]:
-    """The positions in a message: (n, 3) float32 or float64, whichever was sent, in the unit of the scene.
+    """The positions of a message.
 
-    A view of the message, which it keeps alive: to change one is to change the other.
-    Raises ValueError where not exactly one of the two arrays is filled, or a coordinate is not finite or beyond 1e150.
+    Parameters
+    ----------
+    message : hpccd.msg.MeshVertices
+
+    Returns
+    -------
+    ndarray, shape (n, 3), float32 or float64
+        In the unit of the scene; a view of the message.
+
+    Raises
+    ------
+    ValueError
+        If not exactly one of its two arrays is filled, or a coordinate is not finite or beyond 1e150.
     """
     return mesh_messages.vertices_from_message(message, _LARGEST_UINT32)
 
@@ -103,21 +176,47 @@ _ANY = 2**31 - 1
 
 
 def mesh_from_shape(message: Mesh) -> tuple[Topology, NDArray[Any]]:
-    """Topology and (n, 3) float64 vertices of a message for ``mesh.NAME.input: shape``, numbered as they are in it.
+    """Topology and vertices of a shape message, numbered as by the node with ``mesh.NAME.input: shape``.
 
-    Raises ValueError for one that the node refuses.
+    Parameters
+    ----------
+    message : shape_msgs.msg.Mesh
+
+    Returns
+    -------
+    topology : Topology
+    vertices : ndarray, shape (n, 3), float64
+
+    Raises
+    ------
+    ValueError
+        If the node would reject the message.
     """
     mesh = whole_meshes.mesh_from_shape(serialize_message(message), 1, _ANY, _ANY)
     return mesh.topology, mesh.vertices
 
 
 def mesh_from_marker(message: Marker, welding: Welding | None = None) -> tuple[Topology, NDArray[Any]]:
-    """Topology and (n, 3) float64 vertices of a message for ``mesh.NAME.input: marker``, scaled and placed.
+    """Topology and vertices of a marker, numbered as by the node with ``mesh.NAME.input: marker``.
 
-    Faces are numbered as the triangles of the message; vertices in the order in which their points first come, as equal
-    points are one vertex. welding: of the markers that were sent before it; the node keeps what the first of a stream
-    joins, as long as it stays together. None: this is the first.
-    Raises ValueError for one that the node refuses.
+    Parameters
+    ----------
+    message : visualization_msgs.msg.Marker
+        A triangle list. Faces are numbered as its triangles; equal points become one vertex, in order of first use.
+    welding : Welding, optional
+        That of the markers sent before: the node keeps the vertices that the first marker of a stream joins while they
+        stay together. None: this is the first marker.
+
+    Returns
+    -------
+    topology : Topology
+    vertices : ndarray, shape (n, 3), float64
+        Scaled and placed.
+
+    Raises
+    ------
+    ValueError
+        If the node would reject the message.
     """
     data = serialize_message(message)
     mesh = whole_meshes.mesh_from_marker(data, _ANY, _ANY, Welding() if welding is None else welding)

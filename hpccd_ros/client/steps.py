@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far a motion may go: a request to ``~/detect`` from numpy arrays, and the number in its answer; any request as a
-goal of the action of that name."""
+"""Requests to the node, from numpy arrays, and what their responses hold."""
+
+from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -28,15 +29,33 @@ def collision_free_step_request(
     features: str | Iterable[str] = (),
     time_limit: float = 0.0,
 ) -> Detect.Request:
-    """The request that asks how far the motion from ``start`` to ``end`` may go until something touches.
+    """The request for the largest fraction of a motion that is free of contacts.
 
-    start, end: mesh name -> (n, 3) float32 or float64, sent in that precision, in the unit of the scene; the same
-    meshes in both. topologies: mesh name -> its :func:`topology_message`; None: those that the node has for these names
-    (published to it, or from its mesh files). topology_versions: of the latter, where they are not 0. accuracy: "":
-    the node's parameter. minimum_separation: of all pairs of meshes, in the unit of the scene; None: what the node's
-    parameters say. features: "vertex_face", "edge_edge" or both, what is tested; (): what the node's parameter says.
-    time_limit: s until the node gives up; 0: its parameter ``detect_time_limit``.
-    Raises TypeError or ValueError naming the argument.
+    Parameters
+    ----------
+    start, end : mapping of str to ndarray, shape (n, 3), float32 or float64
+        Positions by mesh name, in the unit of the scene; the same meshes in both.
+    topologies : mapping of str to MeshTopology, optional
+        :func:`topology_message` of each mesh. None: those that the node has for these names.
+    topology_versions : mapping of str to int, optional
+        Versions of the node's topologies, if not 0.
+    accuracy : str
+        Accuracy tier; "": the node's parameter.
+    minimum_separation : float, optional
+        Of all pairs of meshes, in the unit of the scene; None: the node's parameters.
+    features : str or iterable of str
+        "vertex_face", "edge_edge" or both; (): the node's parameter.
+    time_limit : float
+        Seconds until the node gives up; 0: its parameter ``detect_time_limit``.
+
+    Returns
+    -------
+    hpccd.srv.Detect.Request
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument has the wrong type, shape or range, or meshes differ.
     """
     names = list(start)
     if not names:
@@ -71,12 +90,23 @@ def collision_free_step_request(
 
 
 def collision_free_step_from_response(response: Detect.Response | DetectAction.Result) -> float:
-    """The largest part of the motion, 0 .. 1, that is certainly free of contacts; 1.0 where nothing touches.
+    """The largest fraction of the motion that is certainly free of contacts.
 
-    response: of the service, or the result of a goal of the action.
+    Parameters
+    ----------
+    response : hpccd.srv.Detect.Response or hpccd.action.Detect.Result
 
-    Raises RuntimeError with the node's own words where it did not compute it (refused, busy, out of time, stopped), and
-    ValueError where something else was asked for: no number comes back that a step must not be taken by.
+    Returns
+    -------
+    float
+        In [0, 1]; 1.0 if there is no contact.
+
+    Raises
+    ------
+    RuntimeError
+        With the node's message, if it computed nothing (rejected, busy, out of time, stopped).
+    ValueError
+        If the request was for another query.
     """
     if not response.success:
         raise RuntimeError(f"the node did not answer: {response.message}")
@@ -106,10 +136,22 @@ def _snapshot(
 
 
 def goal_from_request(request: Detect.Request) -> DetectAction.Goal:
-    """The goal that asks for the same; what it refers to is the request's own.
+    """The goal of the action that asks for the same as a request to the service.
 
-    Its result has the fields of the service's response: functions of this package that read one read the other.
-    Raises TypeError for what is no request.
+    Parameters
+    ----------
+    request : hpccd.srv.Detect.Request
+        The goal refers to its fields.
+
+    Returns
+    -------
+    hpccd.action.Detect.Goal
+        Its result has the fields of the service's response.
+
+    Raises
+    ------
+    TypeError
+        If it is no request.
     """
     if not isinstance(request, Detect.Request):
         raise TypeError(f"request: expected hpccd.srv.Detect.Request, got {type(request).__name__}")

@@ -6,24 +6,24 @@ from rclpy.qos import QoSProfile
 from hpccd_ros.base.quoting import quoted
 from hpccd_ros.middleware import qos, topic_names
 
-#: Publisher of topologies: reliable, transient local, so that a node that starts later gets the last one.
+#: Publisher of topologies: reliable, transient local: a node that starts later receives the last one.
 TOPOLOGY_QOS: QoSProfile = qos.TOPOLOGY
-#: Publisher of vertices or point clouds: reliable, the last 10 kept; fits a node of any ``input_reliability``.
+#: Publisher of vertices or point clouds: reliable, keeps the last 10; fits any ``input_reliability`` of the node.
 VERTICES_QOS: QoSProfile = qos.vertices("reliable", 10)
-#: Subscription to contacts: reliable, the last 10 kept for a reader that is late now and then.
+#: Subscription to contacts: reliable, keeps the last 10.
 CONTACTS_QOS: QoSProfile = qos.CONTACTS
-#: The same, with the last 10 that came before it first: of a node with ``contacts_durability: transient_local``, and
-#: of no other.
+#: Subscription to contacts that also receives the last 10 sent before it; needs a node with
+#: ``contacts_durability: transient_local``.
 LATCHED_CONTACTS_QOS: QoSProfile = qos.LATCHED_CONTACTS
-#: Subscription to distances, in the same way.
+#: Subscription to distances: reliable, keeps the last 10.
 DISTANCES_QOS: QoSProfile = qos.DISTANCES
 
-#: Subscription to pairs, in the same way.
+#: Subscription to pair summaries: reliable, keeps the last 10.
 PAIRS_QOS: QoSProfile = qos.PAIRS
-#: Of the parameter ``stop_timeout``.
+#: Default of the node's parameter ``stop_timeout``, in seconds.
 STOP_TIMEOUT: float = 0.5
 
-#: Relative to the namespace of the node, as the names below.
+#: Topic of contacts, relative to the namespace of the node, like the names below.
 CONTACTS_TOPIC: str = topic_names.CONTACTS
 #: Published while the node's parameter ``distances`` is true.
 DISTANCES_TOPIC: str = topic_names.DISTANCES
@@ -34,10 +34,21 @@ STOP_TOPIC: str = topic_names.STOP
 
 
 def stop_qos(stop_timeout: float = STOP_TIMEOUT) -> QoSProfile:
-    """Subscription to stop that is notified when nothing came for this many seconds: at least those of the node's
-    parameter ``stop_timeout``, else nothing ever comes.
+    """Quality of service of a subscription to the stop topic that also reports missed deadlines.
 
-    Raises TypeError or ValueError for what can be no such time.
+    Parameters
+    ----------
+    stop_timeout : float
+        Seconds, at least those of the node's parameter ``stop_timeout``; with less, no message arrives.
+
+    Returns
+    -------
+    rclpy.qos.QoSProfile
+
+    Raises
+    ------
+    TypeError, ValueError
+        If it is not a number of seconds, more than 0 and at most 3600.
     """
     if isinstance(stop_timeout, bool) or not isinstance(stop_timeout, (int, float)):
         raise TypeError(f"stop_timeout: expected seconds, got {type(stop_timeout).__name__}")
@@ -47,41 +58,106 @@ def stop_qos(stop_timeout: float = STOP_TIMEOUT) -> QoSProfile:
 
 
 def topology_topic(mesh: str) -> str:
-    """Where MeshTopology of this mesh goes: ``meshes/MESH/topology``. mesh: as in the node's parameter ``meshes``.
+    """The topic of MeshTopology messages of a mesh.
 
-    Raises TypeError or ValueError for what can be no name of a mesh.
+    Parameters
+    ----------
+    mesh : str
+        Name of the mesh, as in the node's parameter ``meshes``.
+
+    Returns
+    -------
+    str
+        ``meshes/MESH/topology``, relative to the namespace of the node.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If no mesh can have this name.
     """
     return topic_names.topology(_mesh_name(mesh))
 
 
 def vertices_topic(mesh: str) -> str:
-    """Where MeshVertices of this mesh go: ``meshes/MESH/vertices``. mesh: as in the node's parameter ``meshes``.
+    """The topic of MeshVertices messages of a mesh.
 
-    Raises TypeError or ValueError for what can be no name of a mesh.
+    Parameters
+    ----------
+    mesh : str
+        Name of the mesh, as in the node's parameter ``meshes``.
+
+    Returns
+    -------
+    str
+        ``meshes/MESH/vertices``, relative to the namespace of the node.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If no mesh can have this name.
     """
     return topic_names.vertices(_mesh_name(mesh))
 
 
 def shape_topic(mesh: str) -> str:
-    """Where shape_msgs/Mesh of this mesh go, with ``mesh.MESH.input: shape``: ``meshes/MESH/shape``.
+    """The topic of shape_msgs/Mesh messages of a mesh, for meshes with ``mesh.MESH.input: shape``.
 
-    Raises TypeError or ValueError for what can be no name of a mesh.
+    Parameters
+    ----------
+    mesh : str
+        Name of the mesh, as in the node's parameter ``meshes``.
+
+    Returns
+    -------
+    str
+        ``meshes/MESH/shape``, relative to the namespace of the node.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If no mesh can have this name.
     """
     return topic_names.of_mesh(_mesh_name(mesh), topic_names.SHAPE)
 
 
 def marker_topic(mesh: str) -> str:
-    """Where visualization_msgs/Marker of this mesh go, with ``mesh.MESH.input: marker``: ``meshes/MESH/marker``.
+    """The topic of visualization_msgs/Marker messages of a mesh, for meshes with ``mesh.MESH.input: marker``.
 
-    Raises TypeError or ValueError for what can be no name of a mesh.
+    Parameters
+    ----------
+    mesh : str
+        Name of the mesh, as in the node's parameter ``meshes``.
+
+    Returns
+    -------
+    str
+        ``meshes/MESH/marker``, relative to the namespace of the node.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If no mesh can have this name.
     """
     return topic_names.of_mesh(_mesh_name(mesh), topic_names.MARKER)
 
 
 def pose_topic(mesh: str) -> str:
-    """Where geometry_msgs/PoseStamped of this mesh go, with ``mesh.MESH.input: pose``: ``meshes/MESH/pose``.
+    """The topic of geometry_msgs/PoseStamped messages of a mesh, for meshes with ``mesh.MESH.input: pose``.
 
-    Raises TypeError or ValueError for what can be no name of a mesh.
+    Parameters
+    ----------
+    mesh : str
+        Name of the mesh, as in the node's parameter ``meshes``.
+
+    Returns
+    -------
+    str
+        ``meshes/MESH/pose``, relative to the namespace of the node.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If no mesh can have this name.
     """
     return topic_names.of_mesh(_mesh_name(mesh), topic_names.POSE)
 
