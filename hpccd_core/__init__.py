@@ -20,6 +20,7 @@ from .mesh_files.errors import MeshFileError
 from .mesh_files.load import load_mesh
 from .prepared import PreparedDetection
 from .proximity import Gap, Intersections, Proximity
+from .results import OutputNotComputed
 from .scene import Scene
 
 __all__ = [
@@ -34,6 +35,7 @@ __all__ = [
     "Intersections",
     "InvalidArgument",
     "MeshFileError",
+    "OutputNotComputed",
     "PreparedDetection",
     "Proximity",
     "Scene",

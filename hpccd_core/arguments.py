@@ -1,18 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks of arguments, each with an error that names the argument and the remedy."""
 
+from __future__ import annotations
+
+import difflib
+import inspect
 import math
 import operator
 import struct
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from itertools import chain
-from typing import Any, SupportsIndex, TypeVar
+from typing import TYPE_CHECKING, Any, SupportsIndex, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _core
 from .options import FEATURES, OUTPUTS
+
+if TYPE_CHECKING:
+    from .mesh_layout import MeshLayout
 
 REALS = frozenset({np.dtype(np.float32), np.dtype(np.float64)})  # in this machine's byte order
 LARGEST_COORDINATE = 1e150  # largest_coordinate in src/bvh/coordinate_map.h
@@ -46,8 +53,25 @@ def choice(name: str, value: Word, choices: Iterable[str]) -> Word:
     if not isinstance(value, str):
         raise TypeError(f"{name}: expected a string, got {type(value).__name__}; use one of {', '.join(choices)}")
     if value not in choices:
-        raise ValueError(f"{name}: {value!r} is not known; use one of {', '.join(choices)}")
+        raise ValueError(
+            f"{name}: {value!r} is not known; use one of {', '.join(choices)}{did_you_mean(value, choices)}"
+        )
     return value
+
+
+def hide_unnamed(function: Callable[..., object]) -> None:
+    """Leave out ``*unnamed`` and ``**unknown`` of the signature that help() shows: they are there for their errors."""
+    signature = inspect.signature(function)
+    extra = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    shown = [parameter for parameter in signature.parameters.values() if parameter.kind not in extra]
+    function.__signature__ = signature.replace(parameters=shown)  # type: ignore[attr-defined]
+
+
+def did_you_mean(word: str, choices: Iterable[str]) -> str:
+    """The end of an error message: the choice that is spelled most like the word, if one is."""
+    by_lower = {choice.lower(): choice for choice in choices}
+    near = difflib.get_close_matches(word.lower().replace("-", "_"), by_lower, n=1)
+    return f"; did you mean {by_lower[near[0]]!r}?" if near else ""
 
 
 def whole_number(name: str, value: SupportsIndex, low: int, high: int) -> int:
@@ -67,7 +91,8 @@ def mesh_number(name: str, mesh: str | int, numbers: Mapping[str, int]) -> int:
     """The number of a mesh given by name or number. numbers: name -> number of all meshes."""
     if isinstance(mesh, str):
         if mesh not in numbers:
-            raise ValueError(f"{name}: no mesh is named {mesh!r}; the scene has {', '.join(numbers) or 'none'}")
+            there = ", ".join(numbers) or "none"
+            raise ValueError(f"{name}: no mesh is named {mesh!r}; the scene has {there}{did_you_mean(mesh, numbers)}")
         return numbers[mesh]
     if not numbers:
         raise ValueError(f"{name}: the scene has no mesh yet; add_mesh comes first")
@@ -168,9 +193,15 @@ def _indices(name: str, value: object, rows: str, columns: int) -> NDArray[np.ui
     integers = _integers_of_any_size(value, array) if array.dtype.kind in "fO" else array
     if array.dtype.kind not in "iu" and integers is array:
         remedy = f"; convert with {name}.astype(numpy.uint32)" if array.dtype.kind == "f" else ": indices of vertices"
+        if array.dtype.kind == "f" and (array != np.round(array)).any():
+            remedy = (
+                f"; these look like positions: {name} holds indices of vertices, and positions are given to detect() "
+                "and the other queries"
+            )
         raise TypeError(f"{name}: expected integers, got {_kind(value, array)}{remedy}")
     if array.ndim != 2 or array.shape[1] != columns:
-        raise ValueError(f"{name}: expected shape ({rows}, {columns}), got {array.shape}")
+        remedy = _remedy_for_indices(name, array, columns)
+        raise ValueError(f"{name}: expected shape ({rows}, {columns}), got {array.shape}{remedy}")
     for bad, what in ((integers < 0, "is negative"), (integers > 0xFFFFFFFE, "is beyond 2**32 - 2")):
         if bad.any():
             row, column = np.argwhere(bad)[0]
@@ -179,6 +210,28 @@ def _indices(name: str, value: object, rows: str, columns: int) -> NDArray[np.ui
                 "indices count this mesh's vertices from 0"
             )
     return np.ascontiguousarray(integers, np.uint32)
+
+
+def _remedy_for_indices(name: str, array: NDArray[Any], columns: int) -> str:
+    """The end of an error message about the shape of faces or edges."""
+    if name == "faces":
+        padded = array.reshape(-1, 4) if array.ndim in (1, 2) and array.size % 4 == 0 else None
+        if padded is not None and (padded[:, 0] == 3).all():
+            return "; for VTK's format, in which each triangle begins with 3: faces.reshape(-1, 4)[:, 1:]"
+        if array.ndim == 2 and array.shape[1] == 4:
+            return (
+                "; triangulate quadrilaterals: faces[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3); of tetrahedra give the "
+                "triangles of the surface"
+            )
+        if array.ndim == 2 and array.shape[1] == 2:
+            return "; give segments as edges="
+    elif array.ndim == 2 and array.shape[1] == 3:
+        return "; give triangles as faces"
+    if array.ndim == 2 and array.shape[0] == columns:
+        return f"; transpose it: {name}.T"
+    if array.ndim == 1 and array.size % columns == 0:
+        return f"; reshape it: {name}.reshape(-1, {columns})"
+    return "; triangulate polygons first" if name == "faces" and array.ndim == 2 and array.shape[1] > 4 else ""
 
 
 def _integers_of_any_size(value: object, array: NDArray[Any]) -> NDArray[Any]:
@@ -222,16 +275,75 @@ def _names(argument: str, value: Iterable[str], choices: tuple[str, ...]) -> tup
     return tuple(choice(argument, name, choices) for name in names)
 
 
-def vertices(name: str, value: object, shape: tuple[int, ...]) -> NDArray[Any]:
-    """(V, 3), or of many worlds (W, V, 3), float32 or float64; C-contiguous arrays are taken without a copy."""
+def vertices(name: str, value: object, shape: tuple[int, ...], layout: MeshLayout) -> NDArray[Any]:
+    """(V, 3), or of many worlds (W, V, 3), float32 or float64; C-contiguous arrays are taken without a copy.
+
+    A mapping holds the array of each mesh by its name.
+    """
+    if type(value) is not np.ndarray and isinstance(value, Mapping):
+        return _of_meshes(name, value, shape, layout)
     array = _reals(name, _array(name, value), value)
     if array.shape != shape:
         raise ValueError(
             f"{name}: expected shape {shape}, {'for each world ' if len(shape) > 2 else ''}one row a vertex of the "
-            f"scene's meshes in the order added, got {array.shape}"
+            f"scene's meshes in the order added, got {array.shape}{_remedy_for_positions(name, array, shape, layout)}"
         )
     usable_in_place = array.flags.c_contiguous and array.flags.aligned
     return array if usable_in_place else np.require(array, None, ["C", "A"])
+
+
+def _of_meshes(name: str, value: Mapping[Any, Any], shape: tuple[int, ...], layout: MeshLayout) -> NDArray[Any]:
+    """The arrays of all meshes as one, in the order in which the meshes were added."""
+    there = ", ".join(layout.mesh_names) or "none"
+    for mesh in value:
+        if mesh not in layout.mesh_names:
+            near = did_you_mean(mesh, layout.mesh_names) if isinstance(mesh, str) else ""
+            raise ValueError(f"{name}: no mesh is named {mesh!r}; the scene has {there}{near}")
+    parts = []
+    for mesh, n_vertices in zip(layout.mesh_names, layout.vertex_counts, strict=True):
+        if mesh not in value:
+            raise ValueError(f"{name}: has no positions of mesh {mesh!r}; give those of every mesh: {there}")
+        of_mesh = f"{name}[{mesh!r}]"
+        given = value[mesh]
+        if type(given) is not np.ndarray and hasattr(given, "__cuda_array_interface__"):
+            raise TypeError(
+                f"{of_mesh}: is in a GPU's memory; give one device array of all meshes, or copy it to the host"
+            )
+        array = _reals(of_mesh, _array(of_mesh, given), given)
+        expected = (*shape[:-2], n_vertices, 3)
+        if array.shape != expected:
+            remedy = _remedy_for_positions(of_mesh, array, expected, None)
+            raise ValueError(f"{of_mesh}: expected shape {expected}, one row a vertex, got {array.shape}{remedy}")
+        parts.append(array)
+    if len({array.dtype for array in parts}) > 1:
+        parts = [widened(array) for array in parts]
+    return np.concatenate(parts, axis=-2) if parts else np.empty(shape)
+
+
+def _remedy_for_positions(name: str, array: NDArray[Any], expected: tuple[int, ...], layout: MeshLayout | None) -> str:
+    """The end of an error message about the shape of positions. layout: None where they are of one mesh."""
+    got, n = array.shape, expected[-2]
+    if got == expected[::-1]:
+        return f"; transpose it: {name}.T"
+    if got[:-1] == expected[:-1] and got[-1] == 2:
+        return f"; add a third coordinate: numpy.pad({name}, {((0, 0),) * (len(got) - 1) + ((0, 1),)})"
+    if got[:-1] == expected[:-1] and got[-1] == 4:
+        return f"; leave out the fourth coordinate: {name}[..., :3]"
+    if array.size == math.prod(expected) and len(got) == 1:
+        return f"; reshape it: {name}.reshape{expected}"
+    if len(got) == 3 and len(expected) == 2 and got[1:] == expected:
+        return "; for many worlds make the detector with worlds="
+    if len(expected) == 3 and got == expected[1:]:
+        return "; give the positions of every world"
+    if layout is None or len(got) != len(expected) or got[-1] != 3 or len(layout.mesh_names) == 0:
+        return ""
+    rows = got[-2]
+    for mesh, count in zip(layout.mesh_names, layout.vertex_counts, strict=True):
+        if rows == count < n:
+            return f"; these may be of mesh {mesh!r} alone: give all meshes, concatenated or as a dict {{mesh: array}}"
+    if rows > n:
+        return "; for vertices in no face, add the mesh with n_vertices="
+    return ""
 
 
 def usable(name: str, array: NDArray[Any]) -> None:
@@ -268,7 +380,8 @@ def _reals(name: str, array: NDArray[Any], value: object) -> NDArray[Any]:
         return array.astype(array.dtype.newbyteorder("="))
     remedy = "give an array of numbers"
     if array.dtype.kind in "iuf" and array.ndim > 0:
-        remedy = f"convert with {name}.astype(numpy.float64)"
+        has_method = isinstance(value, np.ndarray)
+        remedy = f"convert with {f'{name}.astype(numpy.float64)' if has_method else f'numpy.asarray({name}, float)'}"
     elif array.dtype.kind == "c":
         remedy = "coordinates are real numbers: give the array of their real parts, if that is what you mean"
     raise TypeError(f"{name}: expected float32 or float64, got {_kind(value, array)}; {remedy}")

@@ -1,62 +1,134 @@
 # SPDX-License-Identifier: Apache-2.0
 """The contacts of one motion step."""
 
+from __future__ import annotations
+
 import dataclasses
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .mesh_layout import Indices, MeshLayout
+from .results import WithSides, output
 from .worlds import PairsOfWorlds, Slices
+
+#: Shape of a row of each output.
+ROWS: dict[str, tuple[int, ...]] = {"points": (3,), "normals": (3,), "closest": (2, 3)}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Contacts(PairsOfWorlds):
-    """Contacts in canonical order: vertex-face by (vertex, face), then edge-edge by (a0, a1, b0, b1).
+class Contacts(WithSides, PairsOfWorlds):
+    """Contacts of one step in canonical order: N vertex-face rows, then M edge-edge rows.
 
-    vf: (N, 2) uint32, vertex and face, scene-wide indices. vf_toc: (N,) float64, times of contact in [0, 1].
-    ee: (M, 4) uint32, a0<a1, b0<b1, (a0,a1)<(b0,b1), vertex indices. ee_toc: (M,) float64.
-    points, normals: (N+M, 3) float64, vertex-face first; empty (0, 3) unless asked for in the detector's outputs.
-    A point is the vertex, or lies on the shorter edge where the other crosses it; where edges are parallel, in the
-    middle of what they share.
-    A normal has length one and stands on the face, or on both edges, as they are at toc. It points to the side of the
-    face on which the vertex is just before toc, or from edge a to the side on which edge b is just before toc. For
-    contact at t=0 that is the side from which the straight-line motion would have come, had it begun earlier. The
-    normal is zero where there is no side, because the motion is coplanar throughout (at rest on each other, or gliding
-    in one plane), and where there is no direction, because at toc the face has no area, or the edges are parallel or
-    points. Names do not matter: any order of corners and ends gives the same normal, edges exchanged turn it round.
-    With a minimum separation a point is the midpoint of the nearest points at toc, and the normal the direction from
-    face to vertex, or from edge a to edge b, when they first come within the separation; if they already touch at the
-    start, the normal is as above.
-    closest: (N+M, 2, 3) float64, the nearest points of both sides at toc: of the vertex and the face, or of edge a and
-    edge b; empty (0, 2, 3) unless "closest" is among the detector's outputs.
-    first_toc: the earliest time, +inf where nothing touches.
-    hash: 64-bit, the same for the same contacts on any backend and any number of threads.
-    Of a detector of W worlds: the rows of the first world, then those of the second, ...; in points, normals and
-    closest first the vertex-face rows of all worlds. Indices are those of one world. vf_offsets, ee_offsets: (W+1,)
-    int64, where the rows of each world begin, and N or M. first_tocs: (W,) float64; first_toc is the least of them.
-    hash: the sum of each world's hash times 2 k + 1, modulo 2**64. world(k): the contacts of one world, as a detector
-    of its own gives them. Without worlds it is as with one: offsets [0, N] and [0, M], one of first_tocs, world(0).
-    a == b: whether all fields are equal, row by row. Contacts are not hashable; use `hash` as a key.
+    :meth:`Detector.detect` and :meth:`Detector.step` return it. ``len(contacts)`` is N + M. Two results are equal if
+    all their arrays are; they are not hashable: use `hash` as a key.
+
+    Attributes
+    ----------
+    vf : ndarray, shape (N, 2), uint32
+        Vertex and face, scene-wide indices, sorted lexicographically.
+    vf_toc : ndarray, shape (N,), float64
+        Time of impact (TOI) of each row of `vf`, as a fraction of the step in [0, 1].
+    ee : ndarray, shape (M, 4), uint32
+        Vertices a0 a1 b0 b1 of two edges, scene-wide: a0 < a1, b0 < b1, (a0, a1) < (b0, b1); sorted.
+    ee_toc : ndarray, shape (M,), float64
+        Time of impact of each row of `ee`.
+    first_toc : float
+        The earliest time of impact; +inf if there are no contacts.
+    hash : int
+        64-bit; the same for the same contacts on any backend and with any number of threads.
+    outputs : dict of str to ndarray
+        The outputs that the detector was asked for; `points`, `normals` and `closest` read it.
+
+    Notes
+    -----
+    Result of W worlds: rows of the first world, then of the second, and so on; `vf_offsets`, `ee_offsets` and
+    :meth:`world` separate them. Indices are those of one world. `hash` is the sum of each world's hash times 2 k + 1,
+    modulo 2**64. Without worlds the result is that of one.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import hpccd_core as hc
+    >>> scene = hc.Scene()
+    >>> _ = scene.add_mesh("falling", [[0, 1, 2]])
+    >>> _ = scene.add_mesh("ground", [[0, 1, 2]], static=True)
+    >>> start = np.array([[0, 0, 1], [1, 0, 3], [0, 1, 3], [-5, -5, 0], [5, -5, 0], [0, 5, 0]], float)
+    >>> end = start.copy()
+    >>> end[:3, 2] -= 2
+    >>> contacts = hc.Detector(scene, outputs=("normals",)).detect(start, end)
+    >>> contacts
+    Contacts(1 vertex-face, 0 edge-edge, first at 0.5)
+    >>> contacts.vf.tolist(), contacts.vf_toc.tolist(), contacts.normals.tolist()
+    ([[0, 1]], [0.5], [[0.0, 0.0, 1.0]])
+    >>> [scene.mesh_names[k] for k in (contacts.mesh_a[0], contacts.mesh_b[0])]
+    ['falling', 'ground']
     """
 
-    vf: NDArray[np.uint32]
+    vf: Indices
     vf_toc: NDArray[np.float64]
-    ee: NDArray[np.uint32]
+    ee: Indices
     ee_toc: NDArray[np.float64]
-    points: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    closest: NDArray[np.float64]
     first_toc: float
     hash: int
+    outputs: dict[str, NDArray[np.float64]] = dataclasses.field(default_factory=dict)
     slices: Slices | None = dataclasses.field(default=None, repr=False)
+    layout: MeshLayout | None = dataclasses.field(default=None, repr=False, compare=False)
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """(N+M, 3) float64, vertex-face first: where the sides touch at their time of impact.
+
+        It is the vertex, or the point of the shorter edge where the other crosses it; for parallel edges the middle of
+        the stretch they share. With a minimum separation it is the midpoint of the nearest points. Raises
+        `OutputNotComputed` unless the detector was made with outputs=("points",).
+        """
+        return output(self.outputs, "points")
+
+    @property
+    def normals(self) -> NDArray[np.float64]:
+        """(N+M, 3) float64, vertex-face first: unit vectors from the face to the vertex, or from edge a to edge b.
+
+        The normal is perpendicular to the face, or to both edges, at the time of impact, and points to the side on
+        which the vertex or edge b is just before. For contact at t = 0 it is the side from which the straight motion
+        would have come had it begun earlier. With a minimum separation it is the direction between the nearest points.
+        It is zero where no side is defined (the motion is coplanar throughout) or no direction (the face has no area,
+        the edges are parallel or points). Raises `OutputNotComputed` unless the detector was made with
+        outputs=("normals",).
+        """
+        return output(self.outputs, "normals")
+
+    @property
+    def closest(self) -> NDArray[np.float64]:
+        """(N+M, 2, 3) float64, vertex-face first: the nearest points of both sides at the time of impact.
+
+        Raises `OutputNotComputed` unless the detector was made with outputs=("closest",).
+        """
+        return output(self.outputs, "closest")
 
     @property
     def first_tocs(self) -> NDArray[np.float64]:
-        """(W,): the earliest time of each world, +inf where nothing touches."""
+        """(W,) float64: the earliest time of impact of each world, +inf if it has no contacts."""
         return np.array([self.first_toc]) if self.slices is None else self.slices.first_tocs
 
-    def world(self, k: int) -> "Contacts":
-        """The contacts of world k, 0 <= k < W: every array and the hash as a detector of it alone gives them."""
+    def world(self, k: int) -> Contacts:
+        """The contacts of world k, bit-identical to those of a detector of that world alone.
+
+        Parameters
+        ----------
+        k : int
+            Number of the world, 0 <= k < W.
+
+        Returns
+        -------
+        Contacts
+
+        Raises
+        ------
+        TypeError, ValueError
+            If there is no such world.
+        """
         k = self._world_number(k)
         if self.slices is None:
             return self
@@ -66,12 +138,14 @@ class Contacts(PairsOfWorlds):
             vf_toc=self.vf_toc[vf],
             ee=self.ee[ee],
             ee_toc=self.ee_toc[ee],
-            points=self._places_of(k, self.points),
-            normals=self._places_of(k, self.normals),
-            closest=self._places_of(k, self.closest),
             first_toc=float(self.slices.first_tocs[k]),
             hash=int(self.slices.hashes[k]),
+            outputs={name: self._places_of(k, rows) for name, rows in self.outputs.items()},
+            layout=self.layout,
         )
+
+    def _pairs(self) -> tuple[Indices, Indices, Indices]:
+        return self.vf, self.ee, self.ee[:0, :3]
 
     def __len__(self) -> int:
         return len(self.vf) + len(self.ee)
@@ -80,18 +154,31 @@ class Contacts(PairsOfWorlds):
         return f"Contacts({len(self.vf)} vertex-face, {len(self.ee)} edge-edge, first at {self.first_toc:.6g})"
 
     @classmethod
-    def none(cls, worlds: int | None = None) -> "Contacts":
-        """No contacts at all, of one world or of so many."""
+    def none(cls, worlds: int | None = None, outputs: Iterable[str] = (), layout: MeshLayout | None = None) -> Contacts:
+        """No contacts at all.
+
+        Parameters
+        ----------
+        worlds : int, optional
+            Number of worlds; None for one.
+        outputs : iterable of str
+            Outputs that the result has, without rows.
+        layout : MeshLayout, optional
+            Meshes of the scene.
+
+        Returns
+        -------
+        Contacts
+        """
         empty = np.empty
         return cls(
             vf=empty((0, 2), np.uint32),
             vf_toc=empty(0),
             ee=empty((0, 4), np.uint32),
             ee_toc=empty(0),
-            points=empty((0, 3)),
-            normals=empty((0, 3)),
-            closest=empty((0, 2, 3)),
             first_toc=np.inf,
             hash=0,
+            outputs={name: empty((0, *ROWS[name])) for name in outputs},
             slices=None if worlds is None else Slices.of_none(worlds),
+            layout=layout,
         )

@@ -1,19 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """The detector: motion of a scene in, contacts out."""
 
+from __future__ import annotations
+
 import contextlib
+import inspect
 import re
 import threading
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any, Literal, cast, overload
+from typing import TYPE_CHECKING, Any, Literal, NoReturn, cast, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from . import _core, arguments, device_arrays
 from .answers import OfMotion, OfNear, OfNearest, OfPierced, OfStep, Options
+from .array_types import ArrayLike, MeshName, Positions, Stream
 from .contacts import Contacts
-from .device_arrays import DeviceArrayLike
 from .device_results import DeviceContacts, DeviceIntersections, DeviceProximity
 from .devices import backends, gpu_status
 from .motion_queries import MotionQueries
@@ -43,7 +46,7 @@ if TYPE_CHECKING:
 
 @contextlib.contextmanager
 def _names_of_a_step() -> Iterator[None]:
-    """Errors of the core speak of both ends of a motion; step() is given one."""
+    """Errors of the core name both ends of a motion; step() takes one."""
     try:
         yield
     except _core.InvalidArgument as error:
@@ -63,116 +66,144 @@ def _require_device(backend: str, method: str) -> None:
 
 
 class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierced, OfNearest]):
-    """Finds every contact of a scene's straight-line motion from one set of positions to the next.
+    """Finds every contact of a scene whose vertices move on straight lines from one set of positions to the next.
 
-    accuracy: "fast", "balanced", "conservative" or "exact"; backend: "auto", "cpu", "hybrid" or "gpu"; threads: 0 for
-    all cores; report: "all" contacts, those at the earliest time only ("first"), or one contact ("any"); outputs: any
-    of "points", "normals", "closest"; simd: "auto", "scalar", "avx2", "avx512" (x86-64) or "neon" (aarch64); the result
-    is the same. On the GPU "any" gives the first contact in canonical order. "fast" is computed as "balanced" by
-    "hybrid" (which "auto" leaves out then), on the GPU where other pairs of meshes have another tier or a separation,
-    and where edges are shorter than a 2,000th to a 4,000th of the scene. What each tier promises: docs/accuracy.md.
-    minimum_separation (in coordinate units): report every pair whose Euclidean distance is at most this at some time of
-    the step, and the earliest such time; 0: those that touch. scene.set_separation and set_separation() say it for a
-    pair of meshes. Neighbours that share no vertex count like all others: keep it below the shortest edge. "exact":
-    as rational arithmetic would decide, times within 1e-12; "conservative": the same, no time late; "balanced", "fast":
-    computed as "exact". No tier reports a pair beyond the separation.
-    features: what is tested at all: "vertex_face", "edge_edge" or both (default). What is left out costs nothing; what
-    is left is found as ever. scene.set_features says it for a pair of meshes. It counts for detect(), step(),
-    collision_free_step() and proximity(); intersections() and distances() look at whole surfaces.
-    method: how CPUs find the pairs to test. Contacts, their order and hash are the same with each, "all" or "first";
-    "any" (one contact, whichever comes first) is offered by "default" only.
-        "default": blocks of eight triangles, boxes compared in SIMD lanes, independent tasks.
-        "published": Kim et al. 2009, sections 3.3, 4 and 6: inter-CD task units, reassigned between threads without
-            locks in the main loop, on a hierarchy that is restructured lazily where it culls badly.
-        "naive": their section 3.2, the baseline of Fig. 7: pairs shared among threads, reconstruction behind locks.
-        "front": Tang et al. 2009, with which section 6.3 compares: the front of the traversal is kept from step to
-            step. Costs memory: 8 bytes for each pair of nodes where the last traversal ended.
-    hybrid_segments, hybrid_segment_pairs (backend "hybrid"): the triangle index queue of Kim et al. 2009, section 5.1:
-        how many segments, and how many pairs of leaves each holds. At least four segments a thread are used.
-    gpus (backend "hybrid"): how many GPUs; 0 for all. A leaf is a block of eight triangles, with the published methods
-        one triangle. The communication thread comes on top of `threads`; with as many as cores it takes the last one's
-        place.
-    restructure: of "published" and "naive", whether they restructure; False only to measure what it brings.
-    results: where answers lie. "host" (default): numpy arrays. "device": detect(), step(), proximity() and
-        intersections() give DeviceContacts, DeviceProximity and DeviceIntersections, whose arrays stay in the memory of
-        the GPU; collision_free_step() and distances() answer on the host as ever. Needs backend "gpu" or "auto", a
-        usable GPU, and method "default". Where the GPU fails, CPUs compute and the answer is brought to the device.
-    worlds: so many copies of the scene, 1 to 65,536, that know nothing of each other. Positions are (W, V, 3), and each
-        world is answered, by every query, bit for bit as by a detector of its own; Contacts tells how the answers of
-        all stand together. CPUs take a world a thread, the GPU takes all worlds at once, "hybrid" one after the other.
-        None: one scene, (V, 3).
     The scene is copied: meshes added to it later do not reach this detector.
-    Raises ValueError or TypeError for an option that will not do, RuntimeError where the system starts fewer threads. A
-    child process made by os.fork() has none of its threads: calls raise RuntimeError there, unless it has one alone.
-    One call at a time: of the calls that several Python threads make of one detector each waits until the one before
-    has ended, and profile and stats are those of the last. Only cancel() never waits. Threads that are to work side by
-    side need a detector each, of one scene if they like.
+
+    Parameters
+    ----------
+    scene : Scene
+        Meshes, and which pairs of them are tested.
+    accuracy : {"exact", "conservative", "balanced", "fast"}
+        "exact": decided as by rational arithmetic. "conservative": no false negatives. "balanced", "fast": rounded.
+    backend : {"auto", "cpu", "gpu", "hybrid"}
+        Where to compute. "auto" picks the fastest for this scene and machine.
+    threads : int
+        Number of CPU threads; 0 for all cores.
+    report : {"all", "first", "any"}
+        All contacts, those at the earliest time of impact, or the first one found.
+    outputs : iterable of {"points", "normals", "closest"}
+        What to compute for each contact beside its features and its time of impact.
+    minimum_separation : float
+        Report features that come within this distance, in the unit of the coordinates. Keep it below the shortest
+        edge: neighbours that share no vertex count. 0 reports only contact.
+    features : {"vertex_face", "edge_edge"} or both
+        Which pairs of features are tested by detect, step, collision_free_step and proximity.
+    results : {"host", "device"}
+        Results as numpy arrays, or left in the GPU's memory (DeviceContacts and others).
+    worlds : int, optional
+        Number of independent copies of the scene; positions are then (W, V, 3). None: one scene, (V, 3).
+    method : {"default", "published", "naive", "front"}
+        CPU broad phase: this library's; Kim et al. 2009, their baseline of section 3.2; Tang et al. 2009.
+    simd : {"auto", "scalar", "avx2", "avx512", "neon"}
+        CPU instruction set. Results are the same.
+    restructure : bool
+        Whether "published" and "naive" restructure their hierarchies.
+    hybrid_segments, hybrid_segment_pairs : int
+        Backend "hybrid": segments of its queue, and pairs of leaves in each.
+    gpus : int
+        Backend "hybrid": number of GPUs; 0 for all.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an option is unknown, invalid, or not available here.
+    RuntimeError
+        If the system starts fewer threads.
+
+    Notes
+    -----
+    One call at a time: calls from several Python threads wait for each other; only :meth:`cancel` does not. A child
+    process made by os.fork() cannot use a detector with more than one thread. Detectors cannot be pickled.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import hpccd_core as hc
+    >>> scene = hc.Scene()
+    >>> _ = scene.add_mesh("falling", [[0, 1, 2]])
+    >>> _ = scene.add_mesh("ground", [[0, 1, 2]], static=True)
+    >>> ground = np.array([[-5.0, -5, 0], [5, -5, 0], [0, 5, 0]])
+    >>> triangle = np.array([[0.0, 0, 1], [1, 0, 3], [0, 1, 3]])
+    >>> detector = hc.Detector(scene)
+    >>> detector.detect({"falling": triangle, "ground": ground}, {"falling": triangle - [0, 0, 2], "ground": ground})
+    Contacts(1 vertex-face, 0 edge-edge, first at 0.5)
     """
 
     _gpu_stages = False  # for measuring, in a class derived from this one: `profile` tells device time by stage too
 
     @overload
     def __init__(
-        self: "Detector[Contacts, float, Proximity, Intersections, list[Gap]]",
+        self: Detector[Contacts, float, Proximity, Intersections, list[Gap]],
         scene: Scene,
         *,
         results: Literal["host"] = "host",
         worlds: None = None,
-        **options: "Unpack[Options]",
+        **options: Unpack[Options],
     ) -> None: ...
 
     @overload
     def __init__(
-        self: "Detector[Contacts, NDArray[np.float64], Proximity, Intersections, list[list[Gap]]]",
+        self: Detector[Contacts, NDArray[np.float64], Proximity, Intersections, list[list[Gap]]],
         scene: Scene,
         *,
         results: Literal["host"] = "host",
         worlds: int,
-        **options: "Unpack[Options]",
+        **options: Unpack[Options],
     ) -> None: ...
 
     @overload
     def __init__(
-        self: "Detector[DeviceContacts, float, DeviceProximity, DeviceIntersections, list[Gap]]",
+        self: Detector[DeviceContacts, float, DeviceProximity, DeviceIntersections, list[Gap]],
         scene: Scene,
         *,
         results: Literal["device"],
         worlds: None = None,
-        **options: "Unpack[Options]",
+        **options: Unpack[Options],
     ) -> None: ...
 
     @overload
     def __init__(
-        self: "Detector[DeviceContacts, NDArray[np.float64], DeviceProximity, DeviceIntersections, list[list[Gap]]]",
+        self: Detector[DeviceContacts, NDArray[np.float64], DeviceProximity, DeviceIntersections, list[list[Gap]]],
         scene: Scene,
         *,
         results: Literal["device"],
         worlds: int,
-        **options: "Unpack[Options]",
+        **options: Unpack[Options],
     ) -> None: ...
 
     def __init__(
         self,
         scene: Scene,
-        *,
+        *unnamed: Any,
         accuracy: Accuracy = "exact",
         backend: Backend = "auto",
         threads: int = 0,
         report: Report = "all",
         outputs: Output | Iterable[Output] = (),
-        simd: Simd = "auto",
         minimum_separation: float = 0.0,
+        features: Feature | Iterable[Feature] = ("vertex_face", "edge_edge"),
+        results: Results = "host",
+        worlds: int | None = None,
         method: Method = "default",
+        simd: Simd = "auto",
         restructure: bool = True,
         hybrid_segments: int = 128,
         hybrid_segment_pairs: int = 2048,
         gpus: int = 0,
-        features: Feature | Iterable[Feature] = ("vertex_face", "edge_edge"),
-        results: Results = "host",
-        worlds: int | None = None,
+        **unknown: Any,
     ) -> None:
         if not isinstance(scene, Scene):
-            raise TypeError(f"scene: expected hpccd_core.Scene, got {type(scene).__name__}")
+            raise TypeError(
+                f"scene: expected hpccd_core.Scene, got {type(scene).__name__}; make one with Scene() and add_mesh()"
+            )
+        if unnamed:
+            raise TypeError(
+                f"Detector: options are given by name, as in accuracy='exact'; got {len(unnamed)} without a name"
+            )
+        for name in unknown:
+            near = arguments.did_you_mean(name, _OPTIONS)
+            raise TypeError(f"Detector: there is no option {name!r}; help(hpccd_core.Detector) lists them{near}")
         self.accuracy = arguments.choice("accuracy", accuracy, ACCURACIES)
         self.report = arguments.choice("report", report, REPORTS)
         arguments.choice("backend", backend, BACKENDS)
@@ -185,7 +216,7 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
         if results == "device":
             _require_device(backend, method)
         self._backend = backend
-        computed = arguments.output_names(outputs)
+        self._outputs = arguments.output_names(outputs)
         self.features = arguments.feature_names(features)
         threads = arguments.whole_number("threads", threads, 0, 1024)
         arguments.choice("simd", simd, SIMD)
@@ -203,17 +234,17 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
         self.n_vertices = scene.n_vertices
         self._shape = (self.n_vertices, 3) if self.worlds is None else (self.worlds, self.n_vertices, 3)
         self._rows = self.n_vertices * (self.worlds or 1)
-        self._mesh_names = tuple(scene.mesh_names)
-        self._mesh_numbers = {name: number for number, name in enumerate(self._mesh_names)}
+        self._layout = scene.layout
+        self._mesh_numbers = {name: number for number, name in enumerate(self._layout.mesh_names)}
         options = _core.Options()
         options.accuracy = getattr(_core.Accuracy, accuracy)
         options.backend = getattr(_core.Backend, backend)
         options.report = getattr(_core.Report, report)
         options.simd = getattr(_core.Simd, simd)
         options.threads = threads
-        options.points = "points" in computed
-        options.normals = "normals" in computed
-        options.closest = "closest" in computed
+        options.points = "points" in self._outputs
+        options.normals = "normals" in self._outputs
+        options.closest = "closest" in self._outputs
         options.minimum_separation = minimum_separation
         options.method = getattr(_core.Method, method)
         options.restructure = arguments.flag("restructure", restructure)
@@ -229,13 +260,32 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
         self._last: NDArray[Any] | None = None
         self._last_on_device = device_arrays.LastStep()
 
-    def step(self, vertices: ArrayLike | DeviceArrayLike, stream: object = None) -> OfMotion:
-        """Streaming: the end of the last step is the start of this one. The first call returns no contacts.
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            "Detector: holds threads and working memory, and cannot be pickled or copied; pickle its Scene, and make a "
+            "Detector from that where it is used"
+        )
 
-        vertices: as for detect(), and refused with the same errors, the first ones too; what was refused does not
-        count: the next step starts where this one would have. Device arrays are taken as by detect(); the last one is
-        kept in a copy on the device. A step from a host array to a device array, or back, raises TypeError; reset()
-        first. stream: as for detect(). With results="device" the first call returns no contacts on the device.
+    def step(self, vertices: Positions, stream: Stream = None) -> OfMotion:
+        """Contacts of the motion from the positions of the last call to these.
+
+        Parameters
+        ----------
+        vertices : Positions, shape (V, 3), float32 or float64
+            As for :meth:`detect`; they are copied. Rejected positions do not count: the next step starts where this
+            one would have. Device arrays must not alternate with host arrays; call :meth:`reset` in between.
+        stream : Stream, optional
+            As for :meth:`detect`.
+
+        Returns
+        -------
+        Contacts or DeviceContacts
+            The first call, and the first after :meth:`reset`, returns no contacts.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As :meth:`detect` raises.
         """
         made_on = device_arrays.stream_number(stream)
         with self._stepping:
@@ -249,10 +299,10 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
         if self._last_on_device:
             raise TypeError("vertices: the last step was a device array; give another one, or call reset() first")
         # Checked, used and kept as it is now, whatever the caller writes there meanwhile.
-        end = arguments.vertices("vertices", vertices, self._shape).copy()
+        end = arguments.vertices("vertices", vertices, self._shape, self._layout).copy()
         if self._last is None and self.results == "host":
             arguments.usable("vertices", end)
-            contacts: Any = Contacts.none(self.worlds)
+            contacts: Any = self._no_contacts()
         else:
             with _names_of_a_step():
                 contacts = self.detect(end if self._last is None else self._last, end, stream)
@@ -277,50 +327,62 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
         self._last_on_device.keep(place, self._rows)
         if last is not None:
             return contacts
-        return Contacts.none(self.worlds) if self.results == "host" else contacts.without_rows()
+        return self._no_contacts() if self.results == "host" else contacts.without_rows()
 
-    def set_separation(self, mesh_a: str | int, mesh_b: str | int, separation: float) -> None:
-        """From the next call on, report pairs of these two meshes (names or numbers) that come within this distance.
+    def _no_contacts(self) -> Contacts:
+        return Contacts.none(self.worlds, self._outputs, self._layout)
 
-        The same mesh twice: within it. 0: those that touch. A call under way ends first. The next one fits its boxes to
-        the new distances as it does to any motion; before it, any number of pairs may be set.
+    def set_separation(self, mesh_a: MeshName, mesh_b: MeshName, separation: float) -> None:
+        """From the next call on, report features of two meshes that come within a distance; nothing is rebuilt.
+
+        Parameters
+        ----------
+        mesh_a, mesh_b : str or int
+            Names or numbers of the meshes; the same mesh twice: within it.
+        separation : float
+            Euclidean distance in the unit of the coordinates; 0 reports only contact.
         """
         a, b = (arguments.mesh_number(n, m, self._mesh_numbers) for n, m in (("mesh_a", mesh_a), ("mesh_b", mesh_b)))
         self._core.set_separation(a, b, arguments.length("separation", separation))
 
     def set_separations(self, of_pairs: ArrayLike) -> None:
-        """set_separation() of all pairs at once: (K, K) numbers of K meshes in the order of the scene, symmetric; the
-        diagonal is within each."""
-        self._core.set_separations(arguments.lengths_of_pairs("of_pairs", of_pairs, len(self._mesh_names)))
+        """:meth:`set_separation` of all pairs at once.
+
+        Parameters
+        ----------
+        of_pairs : ArrayLike, shape (K, K)
+            Distances of the K meshes in the order of the scene, symmetric; the diagonal is within each mesh.
+        """
+        n_meshes = len(self._layout.mesh_names)
+        self._core.set_separations(arguments.lengths_of_pairs("of_pairs", of_pairs, n_meshes))
 
     def cancel(self) -> None:
-        """End the use of this detector, from any thread and without waiting: a call under way, those that wait for it,
-        and all later ones raise hpccd_core.Cancelled (a RuntimeError), within 10 ms. What has been handed to a GPU
-        comes to its end first.
+        """End the use of this detector, from any thread and without waiting.
+
+        The call in progress, those that wait for it, and all later ones raise :class:`Cancelled` within 10 ms. Work
+        that was handed to a GPU runs to its end first.
         """
         self._core.cancel()
 
     def reset(self) -> None:
-        """Forget the last positions: the next step() starts anew."""
+        """Forget the positions of the last :meth:`step`."""
         with self._stepping:
             self._last = None
             self._last_on_device.forget()
 
     @property
     def backend(self) -> str:
-        """Where frames are computed; for "auto", after failures of the GPU, and after queries that only CPUs answer:
-        where the last one was.
-        """
+        """Where the last call was computed: "cpu", "gpu" or "hybrid"."""
         return self._backend if self._backend == "cpu" else self._core.last_backend
 
     @property
     def last_gpu_error(self) -> str:
-        """Why frames meant for the GPU were computed on the CPU (stats["gpu_fallbacks"] counts them); or empty."""
+        """Why frames meant for the GPU were computed on the CPU, or an empty string; stats["gpu_fallbacks"] counts."""
         return self._core.last_gpu_error
 
     @property
     def threads(self) -> int:
-        """Threads in use."""
+        """Number of threads in use."""
         return self._core.threads
 
     @property
@@ -330,11 +392,15 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
 
     @property
     def profile(self) -> dict[str, float]:
-        """Stage name -> ms of the last call, with "total" and the remainder "other"."""
+        """Milliseconds of each stage of the last call, with "total" and the remainder "other"."""
         return self._core.profile()
 
     @property
     def stats(self) -> dict[str, int]:
-        """Counts of the last call: candidate pairs, those that each filter rejected, contacts, bytes used, ... Empty
-        where it failed."""
+        """Counts of the last call: candidate pairs, pairs culled by each filter, contacts, bytes used; empty if it
+        failed."""
         return self._core.stats()
+
+
+arguments.hide_unnamed(Detector.__init__)
+_OPTIONS = tuple(inspect.signature(Detector.__init__).parameters)[2:]

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Answers that stay in a GPU's memory (results="device")."""
+"""Results that stay in a GPU's memory (results="device")."""
+
+from __future__ import annotations
 
 import dataclasses
 import functools
@@ -11,7 +13,9 @@ from numpy.typing import NDArray
 from . import arguments
 from ._core import DeviceArray, integers_on_device
 from .contacts import Contacts
+from .mesh_layout import MeshLayout
 from .proximity import Intersections, Proximity
+from .results import output, with_outputs
 from .worlds import Slices
 
 
@@ -22,10 +26,11 @@ def _floats_on_device(numbers: list[float], device: int) -> DeviceArray:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _OnDevice:
-    """What all of them share. slices: of many worlds, by name as in worlds.Slices."""
+    """Fields that all of them share. slices: with worlds, by name as in worlds.Slices."""
 
     hash: int
     slices: dict[str, DeviceArray | None] | None = dataclasses.field(repr=False)
+    layout: MeshLayout | None = dataclasses.field(repr=False)
 
     def to_host(self) -> Any:
         """A copy in numpy arrays."""
@@ -66,7 +71,12 @@ class _OnDevice:
 class _PairsOnDevice(_OnDevice):
     vf: DeviceArray
     ee: DeviceArray
-    closest: DeviceArray
+    outputs: dict[str, DeviceArray]
+
+    @property
+    def closest(self) -> DeviceArray:
+        """(N+M, 2, 3) float64, as in Contacts and Proximity."""
+        return output(self.outputs, "closest")
 
     @property
     def vf_offsets(self) -> DeviceArray:
@@ -75,23 +85,26 @@ class _PairsOnDevice(_OnDevice):
 
     @property
     def ee_offsets(self) -> DeviceArray:
-        """(W+1,) int64: the same of edge-edge pairs."""
+        """(W+1,) int64: the edge-edge pairs of world k are the rows ee_offsets[k] to ee_offsets[k + 1]."""
         return self._offsets("ee", self.ee)
 
-    def _of_world(self, k: int, of_pairs: tuple[str, ...], of_vf: str, of_ee: str) -> dict[str, Any]:
-        """The fields of one world; of_pairs: arrays with the rows of all vertex-face pairs, then of all others."""
+    def _of_world(self, k: int, of_vf: str, of_ee: str) -> dict[str, Any]:
+        """The fields of one world."""
         of_worlds = self._slices_on_host
         assert of_worlds is not None
         vf, ee = ([int(x) for x in offsets[k : k + 2]] for offsets in (of_worlds.vf, of_worlds.ee))
         n = len(self.vf)
         fields = {name: getattr(self, name).rows(*vf) for name in ("vf", of_vf)}
         fields |= {name: getattr(self, name).rows(*ee) for name in ("ee", of_ee)}
-        for name in of_pairs:
-            rows = getattr(self, name)
-            if len(rows):
-                rows = rows.rows(*vf).joined(rows.rows(n + ee[0], n + ee[1]))
-            fields[name] = rows
-        return fields | {"hash": int(of_worlds.hashes[k]), "slices": None}
+        outputs = {}
+        for name, rows in self.outputs.items():  # rows of all vertex-face pairs, then of all edge-edge pairs
+            outputs[name] = rows.rows(*vf).joined(rows.rows(n + ee[0], n + ee[1])) if len(rows) else rows
+        return fields | {
+            "hash": int(of_worlds.hashes[k]),
+            "slices": None,
+            "layout": self.layout,
+            "outputs": outputs,
+        }
 
     def __len__(self) -> int:
         return len(self.vf) + len(self.ee)
@@ -99,21 +112,26 @@ class _PairsOnDevice(_OnDevice):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class DeviceContacts(_PairsOnDevice):
-    """Contacts, all of them, in a GPU's memory: names, shapes, dtypes and order as in Contacts.
+    """Contacts in a GPU's memory: names, shapes, dtypes and order as in :class:`Contacts`.
 
-    Arrays are hpccd_core.DeviceArray: __cuda_array_interface__ and DLPack, in place, complete when the call returns
-    (cupy.asarray(c.vf), torch.from_dlpack(c.vf_toc), wp.from_dlpack(...)). Their memory is used again by a later call
-    only when nobody holds one of them, or what was made of one, any more. first_toc and hash are on the host.
-    vf_offsets, ee_offsets, first_tocs: on the device, of one world too. world(k): rows of these arrays, in place,
-    but for points, normals and closest, which are copied there. to_host(): the same as Contacts. a == b compares
-    copies on the host.
+    Arrays are :class:`DeviceArray`: CUDA array interface and DLPack, without a copy (``cupy.asarray(c.vf)``,
+    ``torch.from_dlpack(c.vf_toc)``). Their memory is reused only when nobody holds them any more. `first_toc` and
+    `hash` are on the host. :meth:`world` returns rows of these arrays in place, except for outputs, which are copied.
     """
 
     vf_toc: DeviceArray
     ee_toc: DeviceArray
-    points: DeviceArray
-    normals: DeviceArray
     first_toc: float
+
+    @property
+    def points(self) -> DeviceArray:
+        """(N+M, 3) float64, as in Contacts."""
+        return output(self.outputs, "points")
+
+    @property
+    def normals(self) -> DeviceArray:
+        """(N+M, 3) float64, as in Contacts."""
+        return output(self.outputs, "normals")
 
     @property
     def first_tocs(self) -> DeviceArray:
@@ -124,15 +142,15 @@ class DeviceContacts(_PairsOnDevice):
         assert times is not None
         return times
 
-    def world(self, k: int) -> "DeviceContacts":
+    def world(self, k: int) -> DeviceContacts:
         """The contacts of world k, 0 <= k < W."""
         k = self._world_number(k)
         if (of_worlds := self._slices_on_host) is None:
             return self
-        fields = self._of_world(k, ("points", "normals", "closest"), "vf_toc", "ee_toc")
+        fields = self._of_world(k, "vf_toc", "ee_toc")
         return DeviceContacts(**fields, first_toc=float(of_worlds.first_tocs[k]))
 
-    def without_rows(self) -> "DeviceContacts":
+    def without_rows(self) -> DeviceContacts:
         """No contacts at all, of as many worlds, on the same device."""
         rows = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         none = {name: a.rows(0, 0) for name, a in rows.items() if isinstance(a, DeviceArray)}
@@ -143,11 +161,14 @@ class DeviceContacts(_PairsOnDevice):
             times = _floats_on_device([np.inf] * worlds, device)
             hashes = integers_on_device([0] * worlds, device).seen_as("u")
             slices = {"vf": begins, "ee": begins, "ef": None, "hashes": hashes, "first_tocs": times}
-        return DeviceContacts(**none, first_toc=float("inf"), hash=0, slices=slices)
+        outputs = {name: array.rows(0, 0) for name, array in self.outputs.items()}
+        return DeviceContacts(
+            **none, first_toc=float("inf"), hash=0, slices=slices, layout=self.layout, outputs=outputs
+        )
 
     def to_host(self) -> Contacts:
         """A copy in numpy arrays."""
-        return Contacts(**_arrays_on_host(self), first_toc=self.first_toc, hash=self.hash, slices=self._slices_on_host)
+        return Contacts(**_on_host(self), outputs=_outputs_on_host(self), first_toc=self.first_toc)
 
     def __repr__(self) -> str:
         return f"DeviceContacts({len(self.vf)} vertex-face, {len(self.ee)} edge-edge, first at {self.first_toc:.6g})"
@@ -155,21 +176,21 @@ class DeviceContacts(_PairsOnDevice):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class DeviceProximity(_PairsOnDevice):
-    """Proximity in a GPU's memory, as DeviceContacts is to Contacts."""
+    """Proximity in a GPU's memory: names, shapes, dtypes and order as in :class:`Proximity`."""
 
     vf_distance: DeviceArray
     ee_distance: DeviceArray
 
-    def world(self, k: int) -> "DeviceProximity":
+    def world(self, k: int) -> DeviceProximity:
         """The pairs of world k, 0 <= k < W."""
         k = self._world_number(k)
         if self._slices_on_host is None:
             return self
-        return DeviceProximity(**self._of_world(k, ("closest",), "vf_distance", "ee_distance"))
+        return DeviceProximity(**self._of_world(k, "vf_distance", "ee_distance"))
 
     def to_host(self) -> Proximity:
         """A copy in numpy arrays."""
-        return Proximity(**_arrays_on_host(self), hash=self.hash, slices=self._slices_on_host)
+        return Proximity(**_on_host(self), outputs=_outputs_on_host(self))
 
     def __repr__(self) -> str:
         return f"DeviceProximity({len(self.vf)} vertex-face, {len(self.ee)} edge-edge)"
@@ -177,7 +198,7 @@ class DeviceProximity(_PairsOnDevice):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class DeviceIntersections(_OnDevice):
-    """Intersections in a GPU's memory, as DeviceContacts is to Contacts."""
+    """Intersections in a GPU's memory: names, shapes, dtypes and order as in :class:`Intersections`."""
 
     ef: DeviceArray
 
@@ -186,17 +207,17 @@ class DeviceIntersections(_OnDevice):
         """(W+1,) int64: the pairs of world k are the rows ef_offsets[k] to ef_offsets[k + 1]."""
         return self._offsets("ef", self.ef)
 
-    def world(self, k: int) -> "DeviceIntersections":
+    def world(self, k: int) -> DeviceIntersections:
         """The pairs of world k, 0 <= k < W."""
         k = self._world_number(k)
         if (of_worlds := self._slices_on_host) is None:
             return self
         rows = self.ef.rows(*(int(x) for x in of_worlds.ef[k : k + 2]))
-        return DeviceIntersections(ef=rows, hash=int(of_worlds.hashes[k]), slices=None)
+        return DeviceIntersections(ef=rows, hash=int(of_worlds.hashes[k]), slices=None, layout=self.layout)
 
     def to_host(self) -> Intersections:
         """A copy in numpy arrays."""
-        return Intersections(**_arrays_on_host(self), hash=self.hash, slices=self._slices_on_host)
+        return Intersections(**_on_host(self))
 
     def __len__(self) -> int:
         return len(self.ef)
@@ -205,24 +226,32 @@ class DeviceIntersections(_OnDevice):
         return f"DeviceIntersections({len(self.ef)} edge-face)"
 
 
-def _arrays_on_host(found: _OnDevice) -> dict[str, NDArray[Any]]:
+def _on_host(found: _OnDevice) -> dict[str, Any]:
+    """The fields that all results share, their arrays in the host's memory."""
     values = ((f.name, getattr(found, f.name)) for f in dataclasses.fields(found))
-    return {name: value.to_host() for name, value in values if isinstance(value, DeviceArray)}
+    arrays = {name: value.to_host() for name, value in values if isinstance(value, DeviceArray)}
+    return arrays | {"hash": found.hash, "slices": found._slices_on_host, "layout": found.layout}
 
 
-def contacts_of(found: dict[str, Any]) -> DeviceContacts:
-    """From what the core gives out."""
+def _outputs_on_host(found: _PairsOnDevice) -> dict[str, NDArray[Any]]:
+    return {name: array.to_host() for name, array in found.outputs.items()}
+
+
+def contacts_of(found: dict[str, Any], outputs: tuple[str, ...], layout: MeshLayout | None) -> DeviceContacts:
+    """Contacts from what the core returns."""
     del found["ef"]
-    return DeviceContacts(vf_toc=found.pop("vf_values"), ee_toc=found.pop("ee_values"), **found)
+    vf_toc, ee_toc = found.pop("vf_values"), found.pop("ee_values")
+    return DeviceContacts(vf_toc=vf_toc, ee_toc=ee_toc, **with_outputs(found, outputs), layout=layout)
 
 
-def proximity_of(found: dict[str, Any]) -> DeviceProximity:
-    """From what the core gives out."""
+def proximity_of(found: dict[str, Any], outputs: tuple[str, ...], layout: MeshLayout | None) -> DeviceProximity:
+    """Proximity from what the core returns."""
     for name in ("ef", "points", "normals", "first_toc"):
         del found[name]
-    return DeviceProximity(vf_distance=found.pop("vf_values"), ee_distance=found.pop("ee_values"), **found)
+    vf, ee = found.pop("vf_values"), found.pop("ee_values")
+    return DeviceProximity(vf_distance=vf, ee_distance=ee, **with_outputs(found, outputs), layout=layout)
 
 
-def intersections_of(found: dict[str, Any]) -> DeviceIntersections:
-    """From what the core gives out."""
-    return DeviceIntersections(ef=found["ef"], hash=found["hash"], slices=found["slices"])
+def intersections_of(found: dict[str, Any], layout: MeshLayout | None) -> DeviceIntersections:
+    """Intersections from what the core returns."""
+    return DeviceIntersections(ef=found["ef"], hash=found["hash"], slices=found["slices"], layout=layout)

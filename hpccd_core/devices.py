@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where this build on this machine can compute."""
 
+from __future__ import annotations
+
 from typing import TypedDict
 
 from . import _core
 
 
 class GpuDevice(TypedDict):
-    """number: of the device in CUDA. major, minor: its compute capability. memory: bytes."""
+    """A GPU: its CUDA `number`, compute capability `major`.`minor`, and `memory` in bytes."""
 
     name: str
     number: int
@@ -18,8 +20,19 @@ class GpuDevice(TypedDict):
 
 
 class GpuStatus(TypedDict):
-    """compiled: whether this build has GPU code. toolkit: CUDA version and architectures. reason: why there are no
-    devices; empty where there are."""
+    """What a build and machine can do with GPUs.
+
+    Attributes
+    ----------
+    compiled : bool
+        Whether this build has GPU code.
+    toolkit : str
+        CUDA version and architectures of the build.
+    devices : list of GpuDevice
+        Usable devices.
+    reason : str
+        Why there are none; empty if there are.
+    """
 
     compiled: bool
     toolkit: str
@@ -28,12 +41,28 @@ class GpuStatus(TypedDict):
 
 
 def backends() -> list[str]:
-    """The backends usable with this build on this machine, e.g. ["cpu"] or ["cpu", "gpu", "hybrid"]."""
+    """The backends that this build can use on this machine.
+
+    Returns
+    -------
+    list of str
+        ["cpu"], or ["cpu", "gpu", "hybrid"] with a usable GPU.
+
+    Examples
+    --------
+    >>> import hpccd_core as hc
+    >>> "cpu" in hc.backends()
+    True
+    """
     return ["cpu", "gpu", "hybrid"] if gpu_status()["devices"] else ["cpu"]
 
 
 def gpu_status() -> GpuStatus:
-    """What this build and machine can do with GPUs: dict with "compiled" (bool), "toolkit" (str: CUDA version and
-    architectures), "devices" (list of dicts: name, number, major, minor, multiprocessors, memory in bytes) and "reason"
-    (str: why there are none; empty where there are)."""
+    """What this build and machine can do with GPUs, and why a GPU is not usable.
+
+    Returns
+    -------
+    dict
+        "compiled" (bool), "toolkit" (str), "devices" (list of dict) and "reason" (str), see :class:`GpuStatus`.
+    """
     return _core.gpu_status()

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The elementary tests by themselves, many queries at once."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 
 import numpy as np
@@ -19,9 +21,36 @@ def test_vertex_face(
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """Whether and when moving vertices touch moving triangles.
 
-    queries: (Q, 8, 3) float32 or float64, rows v f0 f1 f2 at t=0, then the same at t=1. accuracy: as for Detector.
-    simd: "auto", "scalar", "avx2", "avx512" (x86-64) or "neon" (aarch64); the result is the same.
-    minimum_separation: as for Detector. Returns hit (Q,) bool and toc (Q,) float64, +inf where there is no contact.
+    Parameters
+    ----------
+    queries : ArrayLike, shape (Q, 8, 3), float32 or float64
+        Points v f0 f1 f2 at t=0, then the same at t=1.
+    accuracy : {"exact", "conservative", "balanced", "fast"}
+        As for :class:`Detector`.
+    simd : {"auto", "scalar", "avx2", "avx512", "neon"}
+        CPU instruction set. Results are the same.
+    minimum_separation : float
+        As for :class:`Detector`.
+
+    Returns
+    -------
+    hit : ndarray, shape (Q,), bool
+    toc : ndarray, shape (Q,), float64
+        Earliest time of impact in [0, 1]; +inf without contact.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument has the wrong type or shape, or a coordinate is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import hpccd_core as hc
+    >>> face = [[-1, -1, 0], [1, -1, 0], [0, 1, 0]]
+    >>> hit, toc = hc.test_vertex_face(np.array([[[0, 0, 1], *face, [0, 0, -3], *face]], float))
+    >>> hit.tolist(), toc.tolist()
+    ([True], [0.25])
     """
     return _test(_core.test_vertex_face, queries, accuracy, simd, minimum_separation)
 
@@ -33,7 +62,30 @@ def test_edge_edge(
     simd: Simd = "auto",
     minimum_separation: float = 0.0,
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """Whether and when moving edges touch. Rows a0 a1 b0 b1 at t=0, then the same at t=1; else as test_vertex_face."""
+    """Whether and when moving edges touch each other.
+
+    Parameters
+    ----------
+    queries : ArrayLike, shape (Q, 8, 3), float32 or float64
+        Points a0 a1 b0 b1 at t=0, then the same at t=1.
+    accuracy : {"exact", "conservative", "balanced", "fast"}
+        As for :class:`Detector`.
+    simd : {"auto", "scalar", "avx2", "avx512", "neon"}
+        CPU instruction set. Results are the same.
+    minimum_separation : float
+        As for :class:`Detector`.
+
+    Returns
+    -------
+    hit : ndarray, shape (Q,), bool
+    toc : ndarray, shape (Q,), float64
+        Earliest time of impact in [0, 1]; +inf without contact.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument has the wrong type or shape, or a coordinate is not finite.
+    """
     return _test(_core.test_edge_edge, queries, accuracy, simd, minimum_separation)
 
 

@@ -1,84 +1,119 @@
 # SPDX-License-Identifier: Apache-2.0
 """Queries of one motion, a part of Detector."""
 
+from __future__ import annotations
+
 from typing import Any, Generic, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from . import _core, arguments, device_arrays, device_results
-from ._core import Positions
+from ._core import Positions as CorePositions
 from .answers import OfMotion, OfStep
+from .array_types import DeviceArrayLike, Positions, Stream
 from .contacts import Contacts
-from .device_arrays import DeviceArrayLike, DevicePositions
+from .device_arrays import DevicePositions
+from .mesh_layout import MeshLayout
 from .options import Results
 from .prepared import PreparedDetection
-from .worlds import answer_of
+from .results import result_of, with_outputs
 
 
 class MotionQueries(Generic[OfMotion, OfStep]):
-    """What touches on the way from one set of positions to the next, and when first."""
+    """Queries of the motion from one set of positions to the next."""
 
     worlds: int | None
     results: Results
     _shape: tuple[int, ...]  # of all positions
     _rows: int
     _core: _core.Detector
+    _layout: MeshLayout
+    _outputs: tuple[str, ...]
 
-    def detect(
-        self, vertices_t0: ArrayLike | DeviceArrayLike, vertices_t1: ArrayLike | DeviceArrayLike, stream: object = None
-    ) -> OfMotion:
-        """Contacts of the motion from vertices_t0 to vertices_t1, each (V, 3) float32 or float64.
+    def detect(self, vertices_t0: Positions, vertices_t1: Positions, stream: Stream = None) -> OfMotion:
+        """Contacts of the straight-line motion from `vertices_t0` to `vertices_t1`.
 
-        Of W worlds (W, V, 3).
-        C-contiguous arrays are read in place. Arrays in a GPU's memory (CUDA array interface or DLPack: CuPy, PyTorch,
-        Warp; C-contiguous, backend "gpu" or "auto") are used there without a copy. Raises TypeError for a wrong dtype
-        or a masked element, ValueError for a wrong shape or a coordinate that is NaN, infinite or beyond 1e150.
-        stream: of device arrays, the CUDA stream on which they were made, a cudaStream_t as int, or an object with .ptr
-        (CuPy) or .cuda_stream (PyTorch, Warp): its work so far comes first. Without it, all work on the device does. In
-        both cases the answer is complete when the call returns. With results="device" it counts for arrays on the host
-        too: what it still reads of an answer that nobody holds any more is not written before. A stream of another
-        device, or one that is being captured into a graph, raises ValueError; so does one that is no more, where CUDA
-        notices: a number that was never a stream may crash in CUDA.
-        With results="device" the answer is a DeviceContacts.
+        Parameters
+        ----------
+        vertices_t0, vertices_t1 : Positions, shape (V, 3), float32 or float64
+            Positions of all vertices at both ends of the step: one array, meshes concatenated in the order added, or
+            a dict {mesh name: (n, 3) array}. With W worlds, (W, V, 3). C-contiguous arrays are read in place, also in
+            a GPU's memory (CUDA array interface or DLPack, backend "gpu" or "auto"). Coordinates up to 1e150.
+        stream : Stream, optional
+            CUDA stream that wrote the device arrays; by default all work on the device comes first. The result is
+            complete when the call returns.
+
+        Returns
+        -------
+        Contacts or DeviceContacts
+            DeviceContacts with results="device".
+
+        Raises
+        ------
+        TypeError
+            If an array has the wrong dtype or masked elements.
+        ValueError
+            If a shape is wrong, a coordinate is NaN, infinite or too large, or a static mesh moves.
         """
         found = self._of_motion("detect", vertices_t0, vertices_t1, stream)
         return cast(OfMotion, self._contacts(found))
 
-    def collision_free_step(
-        self, vertices_t0: ArrayLike | DeviceArrayLike, vertices_t1: ArrayLike | DeviceArrayLike, stream: object = None
-    ) -> OfStep:
-        """The largest part of the motion, in [0, 1], that is certainly free of contacts; 1.0 where nothing touches.
+    def collision_free_step(self, vertices_t0: Positions, vertices_t1: Positions, stream: Stream = None) -> OfStep:
+        """The largest fraction of the motion that is certainly free of contacts.
 
-        Of W worlds (W,) float64, that of each.
+        Parameters
+        ----------
+        vertices_t0, vertices_t1 : Positions
+            As for :meth:`detect`.
+        stream : Stream, optional
+            As for :meth:`detect`.
 
-        vertices_t0, vertices_t1: as for detect(), with the same errors. Up to, not including, the time returned nothing
-        touches, or comes within the separation; 0.0 where something does so at the start. "exact" and "conservative":
-        never larger than the true earliest time, at most 1e-9 smaller. "balanced" and "fast": the earliest of the times
-        that detect() gives. Surfaces that pierce each other at the start without touching anywhere are no contact
-        there: ask intersections(). What cannot touch before the best time so far is not looked at, whatever `report`
-        is.
+        Returns
+        -------
+        float, or ndarray of shape (W,) with worlds
+            In [0, 1]; 1.0 if there is no contact, 0.0 if there is one at the start. "exact" and "conservative": never
+            larger than the true earliest time of impact, at most 1e-9 smaller.
 
-        Trial steps, shorter or turned, from one start: at "exact" and "conservative" the second call from there (the
-        first, where the start before came again too) lists the pairs that are near, and later ones test these only. A
-        start is known by its coordinates, wherever they lie, and taken for the same up to about a hundredth of an edge.
-        The list is of use while vertices go no farther, until the time returned, than about an eighth of an edge; or
-        farther, where neighbours go the same way: a mesh may fall, turn and bend as long as those near each other go
-        apart by less than half an edge. Where they do not, each call searches anew. Other queries in between do no
-        harm; a new separation ends it.
+        Raises
+        ------
+        TypeError, ValueError
+            As :meth:`detect` raises.
+
+        Notes
+        -----
+        Surfaces that intersect at the start without touching are no contact: query :meth:`intersections`. Trial steps
+        from the same start are faster from the second call on, at "exact" and "conservative".
         """
         times: NDArray[np.float64] = self._of_motion("collision_free_steps", vertices_t0, vertices_t1, stream)
         return cast(OfStep, float(times[0]) if self.worlds is None else times)
 
     def prepare(
-        self, vertices_t0: DeviceArrayLike, vertices_t1: DeviceArrayLike, room: float = 2.0, stream: object = None
+        self, vertices_t0: DeviceArrayLike, vertices_t1: DeviceArrayLike, room: float = 2.0, stream: Stream = None
     ) -> PreparedDetection:
-        """detect() of these two arrays on the device without a look from the host: for CUDA graphs.
+        """A detection of these two device arrays that a CUDA graph can hold.
 
-        Only with results="device", and without outputs. The arrays are read where they are each time: they must stay
-        there. room: lists and rows hold so many times, 1 to 1000, what the motion that the arrays hold now takes; it is
-        detected once for that. stream: as for detect(). Accuracy, rules and separations are those of now. Raises as
-        detect() does, and RuntimeError where the GPU fails: no CPU stands in.
+        Needs results="device" and no outputs. Accuracy, pairs and separations are those of this call.
+
+        Parameters
+        ----------
+        vertices_t0, vertices_t1 : DeviceArrayLike
+            They are read in place each time, and must stay there.
+        room : float
+            Lists hold this many times, 1 to 1000, what the present motion needs; it is detected once to find out.
+        stream : Stream, optional
+            As for :meth:`detect`.
+
+        Returns
+        -------
+        PreparedDetection
+
+        Raises
+        ------
+        TypeError, ValueError
+            As :meth:`detect` raises.
+        RuntimeError
+            If the GPU fails.
         """
         if self.results != "device":
             raise ValueError("results: prepare() leaves results on the device; use a detector with results='device'")
@@ -88,10 +123,12 @@ class MotionQueries(Generic[OfMotion, OfStep]):
         room = arguments.length("room", room)
         ends = self._places(vertices_t0, vertices_t1, device_arrays.stream_number(stream))
         prepared = self._core.prepare(*self._for_core(*ends), room)
-        return PreparedDetection(prepared, self.worlds, (vertices_t0, vertices_t1))
+        return PreparedDetection(prepared, self.worlds, (vertices_t0, vertices_t1), self._layout)
 
     def _contacts(self, found: Any) -> Any:
-        return device_results.contacts_of(found) if self.results == "device" else answer_of(Contacts, found)
+        if self.results == "device":
+            return device_results.contacts_of(found, self._outputs, self._layout)
+        return result_of(Contacts, with_outputs(found, self._outputs), self._layout)
 
     def _of_motion(self, query: str, vertices_t0: object, vertices_t1: object, stream: object = None) -> Any:
         on_device = [device_arrays.is_on_device(v) for v in (vertices_t0, vertices_t1)]
@@ -100,8 +137,8 @@ class MotionQueries(Generic[OfMotion, OfStep]):
             return self._of_places(query, *self._places(vertices_t0, vertices_t1, made_on))
         if any(on_device):
             raise TypeError("vertices_t0, vertices_t1: one is a device array, the other is not; give both in one place")
-        start = arguments.vertices("vertices_t0", vertices_t0, self._shape)
-        end = arguments.vertices("vertices_t1", vertices_t1, self._shape)
+        start = arguments.vertices("vertices_t0", vertices_t0, self._shape, self._layout)
+        end = arguments.vertices("vertices_t1", vertices_t1, self._shape, self._layout)
         if start.dtype != end.dtype:  # widening a float32 is exact
             start, end = arguments.widened(start), arguments.widened(end)
         return getattr(self._core, query)(*(device_arrays.on_host(end, made_on) for end in (start, end)))
@@ -117,7 +154,7 @@ class MotionQueries(Generic[OfMotion, OfStep]):
     def _of_places(self, query: str, first: DevicePositions, second: DevicePositions) -> Any:
         return getattr(self._core, query)(*self._for_core(first, second))
 
-    def _for_core(self, first: DevicePositions, second: DevicePositions) -> tuple[Positions, Positions]:
+    def _for_core(self, first: DevicePositions, second: DevicePositions) -> tuple[CorePositions, CorePositions]:
         if first.is_double != second.is_double:
             raise TypeError("vertices_t0, vertices_t1: device arrays must both be float32 or both be float64")
         return first.for_core(self._rows), second.for_core(self._rows)

@@ -1,41 +1,68 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The answers about the parts of a step as one answer about the step."""
+"""The contacts of the parts of a step as those of the step."""
+
+from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
 from . import _core, arguments
-from .contacts import Contacts
-from .worlds import answer_of
+from .contacts import ROWS, Contacts
+from .results import result_of, with_outputs
 
 # Name, dtype, shape of a row.
-_ARRAYS = (
-    *(("vf", "uint32", (2,)), ("vf_toc", "float64", ()), ("ee", "uint32", (4,)), ("ee_toc", "float64", ())),
-    *(("points", "float64", (3,)), ("normals", "float64", (3,)), ("closest", "float64", (2, 3))),
-)
+_ARRAYS = (("vf", "uint32", (2,)), ("vf_toc", "float64", ()), ("ee", "uint32", (4,)), ("ee_toc", "float64", ()))
 
 
 def contacts_of_step(answers: Sequence[tuple[Contacts, int, int]]) -> Contacts:
-    """Each pair once, as the first of the answers tells it: (contacts, part, parts), about part number 0 to parts - 1
-    of equal duration, or (contacts, 0, 1) about all of it. Times become those of the step. Order and hash as usual.
+    """The contacts of the parts of a step as those of the step: each pair once, as the first of the parts reports it.
 
-    Raises TypeError if it is not a list, or an answer is not (Contacts, integer, integer). Raises ValueError for a part
-    that the step does not have, for answers of many worlds, and for answers with different outputs.
+    Parameters
+    ----------
+    answers : sequence of (Contacts, int, int)
+        Each (contacts, part, parts): the contacts of part number 0 to parts - 1 of equal duration, or (contacts, 0, 1)
+        for the whole step.
+
+    Returns
+    -------
+    Contacts
+        Times are those of the step; order and hash as those of a detector.
+
+    Raises
+    ------
+    TypeError
+        If it is not a list, or an item is not (Contacts, integer, integer).
+    ValueError
+        For a part that the step does not have, contacts of many worlds, or contacts with different outputs.
     """
     if not isinstance(answers, Iterable):
         raise TypeError(f"answers: expected a list of (contacts, part, parts), got {type(answers).__name__}")
     checked = [_checked(f"answers[{k}]", answer) for k, answer in enumerate(answers)]
-    for name in ("points", "normals", "closest"):
-        with_rows = [len(getattr(contacts, name)) > 0 for contacts, _, _ in checked if len(contacts)]
-        if any(with_rows) and not all(with_rows):
+    asked = {name: [name in contacts.outputs for contacts, _, _ in checked if len(contacts)] for name in ROWS}
+    for name, those in asked.items():
+        if any(those) and not all(those):
             raise ValueError(f"answers: some have {name} and others do not; use detectors with the same outputs")
-    return answer_of(Contacts, _core.contacts_of_step(checked))
+    outputs = tuple(
+        name for name, those in asked.items() if all(those or [name in contacts.outputs for contacts, _, _ in checked])
+    )
+    found: Any = _core.contacts_of_step([(_for_core(contacts), part, parts) for contacts, part, parts in checked])
+    layout = next((contacts.layout for contacts, _, _ in checked if contacts.layout is not None), None)
+    return result_of(Contacts, with_outputs(found, outputs), layout)
 
 
 def hash_of(contacts: Contacts) -> int:
-    """What a detector gives as `hash` for these contacts of one world."""
-    return _core.hash_of_contacts(_contacts("contacts", contacts))
+    """The `hash` that a detector returns for these contacts of one world."""
+    return _core.hash_of_contacts(_for_core(_contacts("contacts", contacts)))
+
+
+def _for_core(contacts: Contacts) -> SimpleNamespace:
+    """The contacts with all outputs as the core reads them: without rows where they were not computed."""
+    outputs = {name: contacts.outputs.get(name, np.empty((0, *row))) for name, row in ROWS.items()}
+    arrays = {name: getattr(contacts, name) for name, _, _ in _ARRAYS}
+    return SimpleNamespace(**arrays, **outputs, first_toc=contacts.first_toc, hash=contacts.hash)
 
 
 def _checked(name: str, answer: object) -> tuple[Contacts, int, int]:
@@ -50,8 +77,11 @@ def _contacts(name: str, contacts: object) -> Contacts:
         raise TypeError(f"{name}: expected hpccd_core.Contacts, got {type(contacts).__name__}")
     if contacts.slices is not None:
         raise ValueError(f"{name}: contacts of many worlds; give those of each world by itself")
-    for field, dtype, row in _ARRAYS:
-        array = getattr(contacts, field)
+    arrays: list[tuple[str, Any, str, tuple[int, ...]]] = [
+        (field, getattr(contacts, field), dtype, row) for field, dtype, row in _ARRAYS
+    ]
+    arrays += [(field, array, "float64", ROWS[field]) for field, array in contacts.outputs.items()]
+    for field, array, dtype, row in arrays:
         if not isinstance(array, np.ndarray) or array.dtype != dtype or array.shape[1:] != row or array.ndim == 0:
             raise TypeError(f"{name}: {field} is not an array as detectors return it; expected (n, *{row}) {dtype}")
     return contacts

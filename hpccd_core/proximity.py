@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What queries of one snapshot answer."""
+"""Results of queries of one snapshot."""
+
+from __future__ import annotations
 
 import dataclasses
 from typing import Literal
@@ -7,33 +9,56 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from .mesh_layout import Indices, MeshLayout
+from .results import WithSides, output
 from .worlds import ComparedByRows, OfWorlds, PairsOfWorlds, Slices
+
+Kind = Literal["vertex-face", "edge-edge", "edge-face", ""]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Proximity(PairsOfWorlds):
-    """Pairs of features within a distance of each other at one time, in the order of Contacts.
+class Proximity(WithSides, PairsOfWorlds):
+    """Pairs of features within a distance of each other: N vertex-face rows, then M edge-edge rows.
 
-    vf: (N, 2) uint32, vertex and face, scene-wide indices. vf_distance: (N,) float64, their Euclidean distance.
-    ee: (M, 4) uint32, a0<a1, b0<b1, (a0,a1)<(b0,b1), vertex indices. ee_distance: (M,) float64.
-    closest: (N+M, 2, 3) float64, vertex-face first: the nearest points of both sides, the vertex and its foot, or those
-    of edge a and edge b; where edges are parallel, in the middle of the stretch along which they are nearest. Empty
-    (0, 2, 3) unless "closest" is among the detector's outputs.
-    hash: 64-bit, the same for the same pairs and distances on any backend and any number of threads.
-    Of a detector of many worlds: vf_offsets, ee_offsets, world(k), and rows and hash, as in Contacts. a == b as in
-    Contacts.
+    :meth:`Detector.proximity` returns it. Order, equality and worlds as in :class:`Contacts`.
+
+    Attributes
+    ----------
+    vf : ndarray, shape (N, 2), uint32
+        Vertex and face, scene-wide indices, sorted lexicographically.
+    vf_distance : ndarray, shape (N,), float64
+        Euclidean distance of each row of `vf`, in the unit of the coordinates.
+    ee : ndarray, shape (M, 4), uint32
+        Vertices a0 a1 b0 b1 of two edges, ordered as in Contacts.
+    ee_distance : ndarray, shape (M,), float64
+        Euclidean distance of each row of `ee`.
+    hash : int
+        64-bit; the same for the same pairs and distances on any backend and with any number of threads.
+    outputs : dict of str to ndarray
+        The outputs that the detector was asked for; `closest` reads it.
     """
 
-    vf: NDArray[np.uint32]
+    vf: Indices
     vf_distance: NDArray[np.float64]
-    ee: NDArray[np.uint32]
+    ee: Indices
     ee_distance: NDArray[np.float64]
-    closest: NDArray[np.float64]
     hash: int
+    outputs: dict[str, NDArray[np.float64]] = dataclasses.field(default_factory=dict)
     slices: Slices | None = dataclasses.field(default=None, repr=False)
+    layout: MeshLayout | None = dataclasses.field(default=None, repr=False, compare=False)
 
-    def world(self, k: int) -> "Proximity":
-        """The pairs of world k, 0 <= k < W: every array and the hash as a detector of it alone gives them."""
+    @property
+    def closest(self) -> NDArray[np.float64]:
+        """(N+M, 2, 3) float64, vertex-face first: the nearest points of both sides.
+
+        They are the vertex and its nearest point on the face, or the points of edge a and edge b; for parallel edges
+        the middle of the stretch along which they are nearest. Raises `OutputNotComputed` unless the detector was made
+        with outputs=("closest",).
+        """
+        return output(self.outputs, "closest")
+
+    def world(self, k: int) -> Proximity:
+        """The pairs of world k, 0 <= k < W, bit-identical to those of a detector of that world alone."""
         k = self._world_number(k)
         if self.slices is None:
             return self
@@ -43,9 +68,13 @@ class Proximity(PairsOfWorlds):
             vf_distance=self.vf_distance[vf],
             ee=self.ee[ee],
             ee_distance=self.ee_distance[ee],
-            closest=self._places_of(k, self.closest),
             hash=int(self.slices.hashes[k]),
+            outputs={name: self._places_of(k, rows) for name, rows in self.outputs.items()},
+            layout=self.layout,
         )
+
+    def _pairs(self) -> tuple[Indices, Indices, Indices]:
+        return self.vf, self.ee, self.ee[:0, :3]
 
     def __len__(self) -> int:
         return len(self.vf) + len(self.ee)
@@ -55,32 +84,40 @@ class Proximity(PairsOfWorlds):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Intersections(OfWorlds):
-    """Edges that pierce or touch faces at one time.
+class Intersections(WithSides, OfWorlds):
+    """Edges that intersect or touch faces. An edge and a face that share a vertex do not count.
 
-    ef: (K, 3) uint32, the edge's vertices a0<a1 and the face, scene-wide indices, sorted lexicographically. An edge and
-    a face that share a vertex do not count.
-    hash: 64-bit, the same for the same pairs on any backend and any number of threads.
-    Of a detector of W worlds: the rows of the first world, then those of the second, ... ef_offsets: (W+1,) int64,
-    where those of each world begin; world(k), hash and a == b as in Contacts.
+    :meth:`Detector.intersections` returns it. Equality and worlds as in :class:`Contacts`.
+
+    Attributes
+    ----------
+    ef : ndarray, shape (K, 3), uint32
+        Vertices a0 < a1 of the edge, and the face; scene-wide indices, sorted lexicographically.
+    hash : int
+        64-bit; the same for the same pairs on any backend and with any number of threads.
     """
 
-    ef: NDArray[np.uint32]
+    ef: Indices
     hash: int
     slices: Slices | None = dataclasses.field(default=None, repr=False)
+    layout: MeshLayout | None = dataclasses.field(default=None, repr=False, compare=False)
 
     @property
     def ef_offsets(self) -> NDArray[np.int64]:
-        """(W+1,): the pairs of world k are the rows ef_offsets[k] to ef_offsets[k + 1]."""
+        """(W+1,) int64: the pairs of world k are the rows ef_offsets[k] to ef_offsets[k + 1]."""
         return self._offsets("ef", len(self.ef))
 
-    def world(self, k: int) -> "Intersections":
-        """The pairs of world k, 0 <= k < W: the array and the hash as a detector of it alone gives them."""
+    def world(self, k: int) -> Intersections:
+        """The pairs of world k, 0 <= k < W, bit-identical to those of a detector of that world alone."""
         k = self._world_number(k)
         if self.slices is None:
             return self
         begin, end = self.slices.ef[k : k + 2]
-        return Intersections(ef=self.ef[begin:end], hash=int(self.slices.hashes[k]))
+        return Intersections(ef=self.ef[begin:end], hash=int(self.slices.hashes[k]), layout=self.layout)
+
+    def _pairs(self) -> tuple[Indices, Indices, Indices]:
+        none = self.ef[:0]
+        return none, none, self.ef
 
     def __len__(self) -> int:
         return len(self.ef)
@@ -93,18 +130,26 @@ class Intersections(OfWorlds):
 class Gap(ComparedByRows):
     """The smallest distance of two meshes at one time, or of the features of one mesh that share no vertex.
 
-    mesh_a, mesh_b: names; mesh_a was added before mesh_b, or is the same.
-    distance: Euclidean; 0 where they touch or intersect; +inf where no pair of features exists.
-    kind: "vertex-face", "edge-edge", "edge-face" (they intersect) or "" (no pair exists).
-    features: scene-wide indices as in Contacts.vf, Contacts.ee or Intersections.ef; of pairs whose
-    distances are the same double the first in order, vertex-face before edge-edge; of those that intersect the first.
-    points: (2, 3) float64, the nearest points of both sides, in the order of the features; (0, 3) where there are none.
-    a == b: whether all fields are equal. Gaps are not hashable.
+    :meth:`Detector.distances` returns a list of them. Gaps are equal if all fields are; they are not hashable.
+
+    Attributes
+    ----------
+    mesh_a, mesh_b : str
+        Names; `mesh_a` was added before `mesh_b`, or is the same.
+    distance : float
+        Euclidean, in the unit of the coordinates; 0 if they touch or intersect, +inf if no pair of features exists.
+    kind : str
+        "vertex-face", "edge-edge", "edge-face" (they intersect) or "" (no pair exists).
+    features : tuple of int
+        Scene-wide indices as in a row of Contacts.vf, Contacts.ee or Intersections.ef: of the nearest pairs the first
+        in order, vertex-face before edge-edge.
+    points : ndarray, shape (2, 3), float64
+        The nearest points of both sides, in the order of `features`; shape (0, 3) if there are none.
     """
 
     mesh_a: str
     mesh_b: str
     distance: float
-    kind: Literal["vertex-face", "edge-edge", "edge-face", ""]
+    kind: Kind
     features: tuple[int, ...]
     points: NDArray[np.float64]

@@ -1,30 +1,53 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes, and which pairs of them matter."""
+"""Meshes, and which pairs of them are tested."""
+
+from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any, overload
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import NDArray
 
 from . import _core, arguments
+from .array_types import ArrayLike, MeshName
+from .mesh_layout import MeshLayout, mesh_of
 from .options import ACCURACIES, Accuracy, Feature
+
+# Most vertices or faces of a scene.
+_MOST = 2**32 - 2
 
 
 class Scene:
-    """Meshes of triangles and of edges alone, with fixed topology; their vertices are concatenated in the order added.
+    """Meshes of triangles and of segments with fixed topology, and which pairs of them are tested.
 
-    Model only what the scene requires: ``self_collision=False`` for bodies that keep their shape, ``static=True`` for
-    meshes that never move, :meth:`ignore_pair` for pairs that cannot or may touch.
+    Vertices and faces are numbered across the scene, in the order in which meshes were added. Model only what the
+    application requires: ``self_collision=False`` for bodies that keep their shape, ``static=True`` for meshes that
+    never move, :meth:`ignore_pair` for pairs that cannot or may touch. A scene can be pickled and copied.
+
+    Examples
+    --------
+    >>> import hpccd_core as hc
+    >>> scene = hc.Scene()
+    >>> cloth = scene.add_mesh("cloth", hc.shapes.grid(10, 10)[1])
+    >>> floor = scene.add_mesh("floor", [[0, 1, 2], [0, 2, 3]], static=True)
+    >>> scene
+    Scene(cloth, floor: 125 vertices, 202 faces)
+    >>> scene.locate(123)
+    ('floor', 2)
     """
 
     def __init__(self) -> None:
         self._core = _core.Scene()
         self._ids: dict[str, int] = {}
+        self._calls: list[tuple[str, tuple[Any, ...]]] = []  # of the core, in order: a copy repeats them
+        self._layout: MeshLayout | None = None  # None: not known since a mesh was added
 
     def add_mesh(
         self,
         name: str,
         faces: ArrayLike = (),
-        *,
+        *unnamed: Any,
         edges: ArrayLike = (),
         n_vertices: int | None = None,
         self_collision: bool = True,
@@ -32,64 +55,128 @@ class Scene:
     ) -> int:
         """Add a mesh and return its number.
 
-        name: unique string. faces: (F, 3) integers, indices into this mesh's own vertices. edges: (E, 2) integers,
-        likewise: edges beside those of the faces, as of a rope or a rod. They are tested as all edges are, their
-        vertices as all vertices. One that is given twice, or is a face's too, counts once. n_vertices: how many
-        vertices the mesh has; by default the largest index + 1; give it where trailing vertices are in no face and no
-        edge (such vertices are tested against faces too). self_collision: whether contacts within the mesh matter.
-        static: a promise that the mesh does not move during a step (detect() refuses one that does); pairs of static
-        meshes are never tested.
+        Parameters
+        ----------
+        name : str
+            Unique name.
+        faces : ArrayLike, shape (F, 3), integers
+            Triangles, as indices into this mesh's own vertices.
+        edges : ArrayLike, shape (E, 2), integers
+            Segments beside the edges of the faces, as of a rope. A segment that occurs twice counts once.
+        n_vertices : int, optional
+            Number of vertices; by default the largest index + 1. Give it if trailing vertices are in no face and no
+            edge; such vertices are tested against faces.
+        self_collision : bool
+            Whether contacts within the mesh are reported.
+        static : bool
+            A promise that the mesh does not move during a step; pairs of static meshes are never tested.
 
-        Raises TypeError or ValueError naming the argument, also where an index is out of range.
+        Returns
+        -------
+        int
+            The number of the mesh, 0 for the first one.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If an argument has the wrong type or shape, an index is out of range, or the name is taken.
         """
+        if unnamed:
+            raise TypeError(
+                "add_mesh: takes a name and faces; vertices are given to detect() and the other queries: write "
+                "add_mesh(name, faces, n_vertices=len(vertices))"
+            )
         name = arguments.text("name", name)
         self_collision, static = arguments.flag("self_collision", self_collision), arguments.flag("static", static)
         indices, segments = arguments.faces(faces), arguments.edges(edges)
         used = max(int(array.max()) + 1 if array.size else 0 for array in (indices, segments))
-        n_vertices = used if n_vertices is None else arguments.whole_number("n_vertices", n_vertices, 0, 2**32 - 2)
-        number = self._core.add_mesh(name, indices, n_vertices, self_collision, static, segments)
-        self._ids[name] = number
-        return number
+        n_vertices = used if n_vertices is None else arguments.whole_number("n_vertices", n_vertices, 0, _MOST)
+        # Copies, because the caller may write to these arrays later.
+        self._repeat("add_mesh", (name, indices.copy(), n_vertices, self_collision, static, segments.copy()))
+        return self._ids[name]
 
-    def ignore_pair(self, mesh_a: str | int, mesh_b: str | int) -> None:
-        """Never report contacts between these two meshes (names or numbers); the same mesh twice: within it."""
-        self._core.ignore_pair(self._number("mesh_a", mesh_a), self._number("mesh_b", mesh_b))
+    def ignore_pair(self, mesh_a: MeshName, mesh_b: MeshName) -> None:
+        """Never report contacts between two meshes.
 
-    def set_accuracy(self, mesh_a: str | int, mesh_b: str | int, accuracy: Accuracy) -> None:
-        """Test this pair of meshes (names or numbers) at another accuracy than the detector's."""
+        Parameters
+        ----------
+        mesh_a, mesh_b : str or int
+            Names or numbers of the meshes; the same mesh twice: within it.
+        """
+        self._call("ignore_pair", mesh_a, mesh_b)
+
+    def set_accuracy(self, mesh_a: MeshName, mesh_b: MeshName, accuracy: Accuracy) -> None:
+        """Test a pair of meshes at another accuracy than the detector's.
+
+        Parameters
+        ----------
+        mesh_a, mesh_b : str or int
+            Names or numbers of the meshes; the same mesh twice: within it.
+        accuracy : {"exact", "conservative", "balanced", "fast"}
+        """
         arguments.choice("accuracy", accuracy, ACCURACIES)
-        self._core.set_accuracy(
-            self._number("mesh_a", mesh_a), self._number("mesh_b", mesh_b), getattr(_core.Accuracy, accuracy)
-        )
+        self._call("set_accuracy", mesh_a, mesh_b, accuracy)
 
-    def set_separation(self, mesh_a: str | int, mesh_b: str | int, separation: float) -> None:
-        """Report pairs of these two meshes (names or numbers) that come within this distance, Euclidean and in units of
-        the coordinates, instead of the detector's minimum_separation; the same mesh twice: within it; 0: that touch."""
-        self._core.set_separation(
-            self._number("mesh_a", mesh_a), self._number("mesh_b", mesh_b), arguments.length("separation", separation)
-        )
+    def set_separation(self, mesh_a: MeshName, mesh_b: MeshName, separation: float) -> None:
+        """Report features of a pair of meshes that come within a distance, instead of the detector's.
 
-    def set_features(self, mesh_a: str | int, mesh_b: str | int, features: Feature | Iterable[Feature]) -> None:
-        """Test only these pairs of features between two meshes (names or numbers), instead of the detector's features.
+        Parameters
+        ----------
+        mesh_a, mesh_b : str or int
+            Names or numbers of the meshes; the same mesh twice: within it.
+        separation : float
+            Euclidean distance in the unit of the coordinates; 0 reports only contact.
+        """
+        self._call("set_separation", mesh_a, mesh_b, arguments.length("separation", separation))
 
-        features: "vertex_face", "edge_edge" or both; the same mesh twice: within it. What is left out costs nothing.
-        Intersections and smallest distances look at whole surfaces all the same. To test nothing: ignore_pair.
+    def set_features(self, mesh_a: MeshName, mesh_b: MeshName, features: Feature | Iterable[Feature]) -> None:
+        """Test only some kinds of features between two meshes, instead of the detector's.
+
+        Parameters
+        ----------
+        mesh_a, mesh_b : str or int
+            Names or numbers of the meshes; the same mesh twice: within it.
+        features : {"vertex_face", "edge_edge"} or both
+            Kinds that are left out cost nothing. Intersections and distances always consider whole surfaces.
         """
         names = arguments.feature_names(features)
-        tested = _core.TestedFeatures("vertex_face" in names, "edge_edge" in names)
-        self._core.set_features(self._number("mesh_a", mesh_a), self._number("mesh_b", mesh_b), tested)
+        self._call("set_features", mesh_a, mesh_b, ("vertex_face" in names, "edge_edge" in names))
 
-    def _number(self, name: str, mesh: str | int) -> int:
+    def _call(self, name: str, mesh_a: MeshName, mesh_b: MeshName, *values: Any) -> None:
+        pair = self._number("mesh_a", mesh_a), self._number("mesh_b", mesh_b)
+        self._repeat(name, (*pair, *values))
+
+    def _repeat(self, name: str, values: tuple[Any, ...]) -> None:
+        """A call of the core, whose arguments are kept in a form that can be pickled."""
+        given = values
+        if name == "set_accuracy":
+            given = (*values[:2], getattr(_core.Accuracy, values[2]))
+        elif name == "set_features":
+            given = (*values[:2], _core.TestedFeatures(*values[2]))
+        number = getattr(self._core, name)(*given)
+        if name == "add_mesh":
+            self._ids[values[0]], self._layout = number, None
+        self._calls.append((name, values))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"calls": list(self._calls)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        Scene.__init__(self)
+        for name, values in state["calls"]:
+            self._repeat(name, values)
+
+    def _number(self, name: str, mesh: MeshName) -> int:
         return arguments.mesh_number(name, mesh, self._ids)
 
     @property
     def n_vertices(self) -> int:
-        """Vertices of all meshes together."""
+        """Number of vertices of all meshes."""
         return self._core.n_vertices
 
     @property
     def n_faces(self) -> int:
-        """Triangles of all meshes together."""
+        """Number of triangles of all meshes."""
         return self._core.n_faces
 
     @property
@@ -97,15 +184,85 @@ class Scene:
         """Names in the order added."""
         return list(self._ids)
 
-    def vertex_offset(self, mesh: str | int) -> int:
-        """The scene-wide index of the mesh's first vertex."""
+    @property
+    def layout(self) -> MeshLayout:
+        """Names of the meshes, and where their vertices and faces begin in the numbering of the scene."""
+        if self._layout is None:
+            firsts = [(self._core.first_vertex(k), self._core.first_face(k)) for k in self._ids.values()]
+            offsets = np.array([*firsts, (self.n_vertices, self.n_faces)], np.int64)
+            self._layout = MeshLayout(tuple(self._ids), offsets[:, 0].copy(), offsets[:, 1].copy())
+        return self._layout
+
+    @overload
+    def locate(self, vertex: NDArray[np.integer[Any]]) -> tuple[NDArray[np.intp], NDArray[np.intp]]: ...
+
+    @overload
+    def locate(self, *, face: NDArray[np.integer[Any]]) -> tuple[NDArray[np.intp], NDArray[np.intp]]: ...
+
+    @overload
+    def locate(self, vertex: int | np.integer[Any]) -> tuple[str, int]: ...
+
+    @overload
+    def locate(self, *, face: int | np.integer[Any]) -> tuple[str, int]: ...
+
+    def locate(self, vertex: Any = None, *, face: Any = None) -> tuple[Any, Any]:
+        """The mesh of a scene-wide index, and the index within that mesh.
+
+        Parameters
+        ----------
+        vertex : int or ndarray of int
+            Scene-wide index of a vertex, as in ``contacts.vf[:, 0]`` and ``contacts.ee``.
+        face : int or ndarray of int
+            Scene-wide index of a face, as in ``contacts.vf[:, 1]``. Give one of both.
+
+        Returns
+        -------
+        mesh : str, or ndarray of int for an array
+            Name of the mesh; for an array of indices the number of the mesh of each, see `mesh_names`.
+        index : int, or ndarray of int for an array
+            Index within that mesh.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If an index is not an integer, or beyond the scene.
+
+        Examples
+        --------
+        >>> import hpccd_core as hc
+        >>> scene = hc.Scene()
+        >>> _ = scene.add_mesh("a", [[0, 1, 2]]), scene.add_mesh("b", [[0, 1, 2], [0, 2, 3]])
+        >>> scene.locate(3), scene.locate(face=2)
+        (('b', 0), ('b', 1))
+        """
+        if (vertex is None) == (face is None):
+            raise TypeError("locate: give vertex or face, one of both")
+        name, value, total = ("vertex", vertex, self.n_vertices) if face is None else ("face", face, self.n_faces)
+        offsets = self.layout.vertex_offsets if face is None else self.layout.face_offsets
+        if not isinstance(value, (np.ndarray, list, tuple)) or np.ndim(value) == 0:
+            index = arguments.whole_number(name, value, 0, total - 1)
+            mesh = int(mesh_of(np.array(index), offsets))
+            return self.layout.mesh_names[mesh], index - int(offsets[mesh])
+        indices = np.asarray(value)
+        if indices.dtype.kind not in "iu" and indices.size:
+            raise TypeError(f"{name}: expected integers, got dtype {indices.dtype}")
+        if indices.size and not (0 <= indices.min() and indices.max() < total):
+            raise ValueError(f"{name}: indices must lie in [0, {total - 1}], got {indices.min()} to {indices.max()}")
+        meshes = mesh_of(indices, offsets)
+        return meshes, indices.astype(np.intp) - offsets[meshes]
+
+    def vertex_offset(self, mesh: MeshName) -> int:
+        """The scene-wide index of the first vertex of a mesh, given by name or number."""
         return self._core.first_vertex(self._number("mesh", mesh))
 
-    def face_offset(self, mesh: str | int) -> int:
-        """The scene-wide index of the mesh's first face."""
+    def face_offset(self, mesh: MeshName) -> int:
+        """The scene-wide index of the first face of a mesh, given by name or number."""
         return self._core.first_face(self._number("mesh", mesh))
 
     def __repr__(self) -> str:
         n_edges = self._core.n_edges
         edges = f", {n_edges} edges beside" if n_edges else ""
         return f"Scene({', '.join(self._ids)}: {self.n_vertices} vertices, {self.n_faces} faces{edges})"
+
+
+arguments.hide_unnamed(Scene.add_mesh)

@@ -1,62 +1,108 @@
 # SPDX-License-Identifier: Apache-2.0
 """Queries of one snapshot, a part of Detector."""
 
-from typing import Any, Generic, cast
+from __future__ import annotations
 
-from numpy.typing import ArrayLike
+from typing import Any, Generic, cast
 
 from . import _core, arguments, device_arrays, device_results
 from .answers import OfNear, OfNearest, OfPierced
-from .device_arrays import DeviceArrayLike
+from .array_types import Positions, Stream
+from .mesh_layout import MeshLayout
 from .options import Results
 from .proximity import Gap, Intersections, Proximity
-from .worlds import answer_of
+from .results import result_of, with_outputs
 
 
 class SnapshotQueries(Generic[OfNear, OfPierced, OfNearest]):
-    """What is near, pierced, or nearest at one time. Coordinates may be as large as 1e300."""
+    """Queries of positions at one time. Coordinates may be as large as 1e300."""
 
     worlds: int | None
     results: Results
     _shape: tuple[int, ...]  # of all positions
     _rows: int
     _core: _core.Detector
-    _mesh_names: tuple[str, ...]
+    _layout: MeshLayout
+    _outputs: tuple[str, ...]
 
-    def proximity(self, vertices: ArrayLike | DeviceArrayLike, distance: float, stream: object = None) -> OfNear:
-        """All vertex-face and edge-edge pairs within a distance of each other, features that share a vertex apart.
+    def proximity(self, vertices: Positions, distance: float, stream: Stream = None) -> OfNear:
+        """All vertex-face and edge-edge pairs within a distance of each other.
 
-        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. distance:
-        Euclidean, between closed features, in units of the coordinates; 0 gives those that touch. "exact" and
-        "conservative" report exactly the pairs that rational arithmetic would; "balanced" and "fast" promise it not,
-        but are computed alike today; distances are within 1e-12 of the scene's size. Neighbours that share no vertex
-        count like all others: with a distance beyond the shortest edge all of them are reported. stream: as for
-        detect(). With results="device" the answer is a DeviceProximity.
+        Parameters
+        ----------
+        vertices : Positions
+            As for :meth:`detect`; coordinates up to 1e300.
+        distance : float
+            Euclidean, in the unit of the coordinates; 0 reports contact. Beyond the length of an edge its neighbours
+            are reported too: only features that share a vertex are left out.
+        stream : Stream, optional
+            As for :meth:`detect`.
+
+        Returns
+        -------
+        Proximity or DeviceProximity
+            "exact" and "conservative": exactly the pairs of rational arithmetic; distances within 1e-12 of the
+            scene's size.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As :meth:`detect` raises.
         """
         distance = arguments.length("distance", distance)
         found = self._ask("proximity", vertices, stream, distance)
         on_device = self.results == "device"
-        return cast(OfNear, device_results.proximity_of(found) if on_device else answer_of(Proximity, found))
+        if on_device:
+            return cast(OfNear, device_results.proximity_of(found, self._outputs, self._layout))
+        return cast(OfNear, result_of(Proximity, with_outputs(found, self._outputs), self._layout))
 
-    def intersections(self, vertices: ArrayLike | DeviceArrayLike, stream: object = None) -> OfPierced:
-        """All edges that pierce or touch a face with which they share no vertex, coplanar ones included.
+    def intersections(self, vertices: Positions, stream: Stream = None) -> OfPierced:
+        """All edges that intersect or touch a face with which they share no vertex, coplanar ones included.
 
-        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. Decided as
-        rational arithmetic would, at every accuracy. stream: as for detect(). With results="device" the answer is a
-        DeviceIntersections.
+        Parameters
+        ----------
+        vertices : Positions
+            As for :meth:`detect`; coordinates up to 1e300.
+        stream : Stream, optional
+            As for :meth:`detect`.
+
+        Returns
+        -------
+        Intersections or DeviceIntersections
+            Decided as by rational arithmetic, at every accuracy.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As :meth:`detect` raises.
         """
         found = self._ask("intersections", vertices, stream)
         on_device = self.results == "device"
-        return cast(OfPierced, device_results.intersections_of(found) if on_device else answer_of(Intersections, found))
+        if on_device:
+            return cast(OfPierced, device_results.intersections_of(found, self._layout))
+        return cast(OfPierced, result_of(Intersections, found, self._layout))
 
-    def distances(self, vertices: ArrayLike | DeviceArrayLike, stream: object = None) -> OfNearest:
+    def distances(self, vertices: Positions, stream: Stream = None) -> OfNearest:
         """The smallest distance of each pair of meshes that the scene enables, within a mesh too.
 
-        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. One Gap for
-        each pair, in the order in which the meshes were added: (0, 0), (0, 1), ... Of W worlds a list of W such lists.
-        Found by branch and bound, without a list of pairs.
+        Parameters
+        ----------
+        vertices : Positions
+            As for :meth:`detect`; coordinates up to 1e300.
+        stream : Stream, optional
+            As for :meth:`detect`.
+
+        Returns
+        -------
+        list of Gap, or list of W such lists with worlds
+            A Gap for each pair, in the order in which the meshes were added: (0, 0), (0, 1), ...
+
+        Raises
+        ------
+        TypeError, ValueError
+            As :meth:`detect` raises.
         """
-        names = self._mesh_names
+        names = self._layout.mesh_names
         gaps = [
             Gap(names[a], names[b], distance, kind, tuple(features), points)
             for a, b, distance, kind, features, points in self._ask("distances", vertices, stream)
@@ -72,5 +118,5 @@ class SnapshotQueries(Generic[OfNear, OfPierced, OfNearest]):
         if device_arrays.is_on_device(vertices):
             place = device_arrays.positions("vertices", vertices, self._shape, made_on)
             return ask(place.for_core(self._rows), *more)
-        there = arguments.vertices("vertices", vertices, self._shape)
+        there = arguments.vertices("vertices", vertices, self._shape, self._layout)
         return ask(device_arrays.on_host(there, made_on), *more)

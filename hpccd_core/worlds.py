@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The answers of many worlds in one: where the rows of each stand among those of all."""
+"""Results of many worlds in one: where the rows of each world lie among those of all."""
+
+from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
@@ -11,11 +12,10 @@ from numpy.typing import NDArray
 from . import arguments
 
 Row = TypeVar("Row", bound=np.generic)
-Answer = TypeVar("Answer", bound="OfWorlds")
 
 
 class ComparedByRows:
-    """Base of dataclasses that are equal if all fields are equal: arrays row by row, and NaN equals NaN.
+    """Base of dataclasses that are equal if all fields that count are equal: arrays row by row, and NaN equals NaN.
 
     Not hashable, like numpy arrays.
     """
@@ -23,13 +23,15 @@ class ComparedByRows:
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):
             return NotImplemented
-        names = [field.name for field in dataclasses.fields(self)]  # type: ignore[arg-type]
+        names = [field.name for field in dataclasses.fields(self) if field.compare]  # type: ignore[arg-type]
         return self is other or all(_equal(getattr(self, name), getattr(other, name)) for name in names)
 
     __hash__ = None  # type: ignore[assignment]
 
 
 def _equal(a: Any, b: Any) -> bool:
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(_equal(a[key], b[key]) for key in a)
     if isinstance(a, float) and isinstance(b, float):
         a, b = np.array(a), np.array(b)
     if not (isinstance(a, np.ndarray) and isinstance(b, np.ndarray)):
@@ -47,10 +49,10 @@ def _equal(a: Any, b: Any) -> bool:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Slices(ComparedByRows):
-    """Of W worlds; what an answer does not have is empty.
+    """Rows of W worlds; arrays that a result does not have are empty.
 
-    vf, ee, ef: (W+1,) int64, where the rows of each world begin, and how many there are. hashes: (W,) uint64, of each
-    world's rows. first_tocs: (W,) float64.
+    vf, ee, ef: (W+1,) int64, where the rows of each world begin, and their total. hashes: (W,) uint64, of each world's
+    rows. first_tocs: (W,) float64.
     """
 
     vf: NDArray[np.int64]
@@ -60,21 +62,14 @@ class Slices(ComparedByRows):
     first_tocs: NDArray[np.float64]
 
     @classmethod
-    def of_none(cls, worlds: int) -> "Slices":
-        """Of worlds without contacts."""
+    def of_none(cls, worlds: int) -> Slices:
+        """Worlds without contacts."""
         begin = np.zeros(worlds + 1, np.int64)
         return cls(begin, begin.copy(), np.empty(0, np.int64), np.zeros(worlds, np.uint64), np.full(worlds, np.inf))
 
 
-def answer_of(kind: Callable[..., Answer], found: Any) -> Answer:
-    """The answer of this kind that the core gives as a dict."""
-    if slices := found.get("slices"):
-        found["slices"] = Slices(**slices)
-    return kind(**found)
-
-
 class OfWorlds(ComparedByRows):
-    """An answer that may be of many worlds. Without `slices` it is of one, whose rows are all."""
+    """A result of one or many worlds. Without `slices` it is of one, whose rows are all."""
 
     slices: Slices | None
 
@@ -86,28 +81,28 @@ class OfWorlds(ComparedByRows):
 
 
 class PairsOfWorlds(OfWorlds):
-    """One with vertex-face and edge-edge pairs."""
+    """A result with vertex-face and edge-edge pairs."""
 
     vf: NDArray[np.uint32]
     ee: NDArray[np.uint32]
 
     @property
     def vf_offsets(self) -> NDArray[np.int64]:
-        """(W+1,): the vertex-face pairs of world k are the rows vf_offsets[k] to vf_offsets[k + 1]."""
+        """(W+1,) int64: the vertex-face pairs of world k are the rows vf_offsets[k] to vf_offsets[k + 1]."""
         return self._offsets("vf", len(self.vf))
 
     @property
     def ee_offsets(self) -> NDArray[np.int64]:
-        """(W+1,): the same of edge-edge pairs."""
+        """(W+1,) int64: the edge-edge pairs of world k are the rows ee_offsets[k] to ee_offsets[k + 1]."""
         return self._offsets("ee", len(self.ee))
 
     def _rows_of(self, k: int) -> tuple[slice, slice]:
-        """Of world k, vertex-face and edge-edge."""
+        """Rows of world k, vertex-face and edge-edge."""
         vf, ee = self.vf_offsets, self.ee_offsets
         return slice(int(vf[k]), int(vf[k + 1])), slice(int(ee[k]), int(ee[k + 1]))
 
     def _places_of(self, k: int, places: NDArray[Row]) -> NDArray[Row]:
-        """Of an array with the rows of all vertex-face pairs, then of all edge-edge pairs; or of no pairs at all."""
+        """Rows of world k of an array that holds all vertex-face rows, then all edge-edge rows."""
         vf, ee = self._rows_of(k)
         n = len(self.vf)
         return np.concatenate([places[vf], places[n + ee.start : n + ee.stop]])

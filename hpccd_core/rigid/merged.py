@@ -32,10 +32,14 @@ def earliest(contacts: hc.Contacts) -> hc.Contacts:
     """Those at first_toc alone, as a detector that reports "first" gives them."""
     of_vf, of_ee = (np.flatnonzero(toc == contacts.first_toc) for toc in (contacts.vf_toc, contacts.ee_toc))
     rows = np.concatenate([of_vf, len(contacts.vf) + of_ee])
-    places = {
-        name: values[rows] if len(values := getattr(contacts, name)) else values
-        for name in ("points", "normals", "closest")
-    }
-    vf, vf_toc, ee, ee_toc = contacts.vf[of_vf], contacts.vf_toc[of_vf], contacts.ee[of_ee], contacts.ee_toc[of_ee]
-    first = hc.Contacts(vf=vf, vf_toc=vf_toc, ee=ee, ee_toc=ee_toc, **places, first_toc=contacts.first_toc, hash=0)
+    first = hc.Contacts(
+        vf=contacts.vf[of_vf],
+        vf_toc=contacts.vf_toc[of_vf],
+        ee=contacts.ee[of_ee],
+        ee_toc=contacts.ee_toc[of_ee],
+        first_toc=contacts.first_toc,
+        hash=0,
+        outputs={name: values[rows] for name, values in contacts.outputs.items()},
+        layout=contacts.layout,
+    )
     return replace(first, hash=hash_of(first))

@@ -4,22 +4,19 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpccd_core.mesh_layout import MeshLayout
 from hpccd_ros.frames.types import Topology
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class Layout(MeshLayout):
     """Position of each mesh in the scene-wide numbering of the core.
 
     ``vertex_offsets``, ``face_offsets``: (K+1,) int64, the last entry is the total. ``topology_versions``: one for each
     mesh; empty: not known.
     """
 
-    mesh_names: tuple[str, ...]
-    vertex_offsets: NDArray[np.int64]
-    face_offsets: NDArray[np.int64]
     topology_versions: tuple[int, ...] = ()
 
     @classmethod

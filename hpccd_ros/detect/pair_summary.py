@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hpccd_core as hc
+from hpccd_core.mesh_layout import mesh_of
 from hpccd_ros.detect.step_detector import Detection
 
 
@@ -50,15 +51,11 @@ def _by_pair(found: Detection) -> tuple[np.ndarray, np.ndarray]:
         (contacts.vf[:, 0], contacts.vf[:, 1], faces, contacts.vf_toc),
         (contacts.ee[:, 0], contacts.ee[:, 2], vertices, contacts.ee_toc),
     ):
-        a, b = _mesh_of(first, vertices), _mesh_of(second, offsets)
+        a, b = mesh_of(first, vertices), mesh_of(second, offsets)
         pair = np.minimum(a, b) * meshes + np.maximum(a, b)
         counts += np.bincount(pair, minlength=meshes * meshes)
         np.minimum.at(earliest, pair, toc)
     return counts.reshape(meshes, meshes), earliest.reshape(meshes, meshes)
-
-
-def _mesh_of(indices: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    return np.searchsorted(offsets, indices, side="right") - 1
 
 
 def directions(gaps: Sequence[hc.Gap]) -> NDArray[np.float64]:

@@ -26,7 +26,7 @@ def fill_proximity(
     """Write all but header, start, step, accuracy and backend. max_contacts: 0: all; else this many of the nearest, in
     canonical order. outputs: whether to send closest, where the core has computed it."""
     pairs, distance = FeaturePairs.of(near.vf, near.ee), np.concatenate([near.vf_distance, near.ee_distance])
-    closest = near.closest if "closest" in outputs and len(near.closest) == len(pairs) else None
+    closest = near.outputs.get("closest") if "closest" in outputs else None
     keep = lowest(distance, max_contacts) if 0 < max_contacts < len(pairs) else None
     _fill(message, pairs, layout, near.hash, keep)
     message.distance = to_field(distance if keep is None else distance[keep])

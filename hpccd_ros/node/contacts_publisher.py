@@ -96,7 +96,7 @@ class ContactsPublisher:
             contact_markers(
                 np.asarray(found.contacts.points),
                 np.asarray(found.contacts.normals),
-                np.asarray(found.contacts.closest),
+                getattr(found.contacts, "closest", np.empty((0, 2, 3))),  # computed only with a separation
                 len(found.contacts.vf),
                 stamp=header.stamp,
                 frame_id=header.frame_id,

@@ -138,7 +138,8 @@ def test_equality(mode):
     def answers():
         equal = []
         for x, y in ((0.0, 5e-324), (0.0, -0.0), (np.nan, np.nan), (1.0, 2.0)):
-            pair = [dataclasses.replace(contacts, closest=np.full_like(contacts.closest, z)) for z in (x, y)]
+            filled = [{"closest": np.full_like(contacts.closest, z)} for z in (x, y)]
+            pair = [dataclasses.replace(contacts, outputs=outputs) for outputs in filled]
             times = [dataclasses.replace(contacts, first_toc=z) for z in (x, y)]
             equal += [pair[0] == pair[1], times[0] == times[1]]
         return equal

@@ -29,14 +29,18 @@ def test_answers_are_equal_where_all_rows_are(meshes, query):
     found = ask(hc.Detector(meshes.scene(), outputs=OUTPUTS, backend="cpu"), meshes)
     again = ask(hc.Detector(meshes.scene(), outputs=OUTPUTS, backend="cpu", threads=1), meshes)
     assert len(found) > 1 and found == again and not found != again
-    for field in dataclasses.fields(found):
-        value = getattr(found, field.name)
+    outputs = getattr(found, "outputs", {})
+    arrays = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)} | outputs
+    for name, value in arrays.items():
         if isinstance(value, np.ndarray) and len(value):
             changed = value.copy()
             changed.flat[-1] += 1
-            assert found != dataclasses.replace(found, **{field.name: changed}), field.name
-            assert found != dataclasses.replace(found, **{field.name: value[:-1]}), field.name
-            assert found != dataclasses.replace(found, **{field.name: value.astype(np.float16)}), field.name
+            for other in (changed, value[:-1], value.astype(np.float16)):
+                given = {"outputs": outputs | {name: other}} if name in outputs else {name: other}
+                assert found != dataclasses.replace(found, **given), name
+    for name in outputs:
+        others = {other: rows for other, rows in outputs.items() if other != name}
+        assert found != dataclasses.replace(found, outputs=others), name
     assert found != dataclasses.replace(found, hash=found.hash ^ 1)
     assert found != None and found != 3  # noqa: E711
     with pytest.raises(TypeError, match="unhashable"):

@@ -26,8 +26,8 @@ def test_only_what_is_asked_for(meshes):
     n = len(_contacts(meshes, ()))
     for outputs in ((), ("points",), ("normals",), ("points", "normals")):
         contacts = _contacts(meshes, outputs)
-        assert contacts.points.shape == ((n if "points" in outputs else 0), 3)
-        assert contacts.normals.shape == ((n if "normals" in outputs else 0), 3)
+        assert {name: rows.shape for name, rows in contacts.outputs.items()} == dict.fromkeys(outputs, (n, 3))
+        assert [name for name in ("points", "normals", "closest") if hasattr(contacts, name)] == list(outputs)
 
 
 def test_points_lie_on_both_features(meshes):

@@ -195,7 +195,8 @@ def test_nearest_points_lie_on_their_features_and_are_as_near_as_told(generate):
 
 def test_without_being_asked_for_there_are_no_nearest_points():
     meshes = random_scenes.single_mesh(np.random.default_rng(63))
-    assert len(detector_of(meshes).proximity(meshes.vertices_t1, DISTANCE).closest) == 0
+    with pytest.raises(hc.OutputNotComputed, match=r"closest: not computed; .*outputs=\('closest',\)"):
+        _ = detector_of(meshes).proximity(meshes.vertices_t1, DISTANCE).closest
 
 
 def test_nothing_there():

@@ -182,8 +182,10 @@ def test_first_tocs_of_one_world_on_a_device(monkeypatch, time):
     monkeypatch.setattr(
         device_results, "integers_on_device", lambda numbers, device: There(np.array(numbers, np.int64))
     )
-    rows = dict.fromkeys(("vf", "ee", "closest", "vf_toc", "ee_toc", "points", "normals"), There([]))
-    times = hc.DeviceContacts(**rows, first_toc=time, hash=0, slices=None).first_tocs.values
+    rows = dict.fromkeys(("vf", "ee", "vf_toc", "ee_toc"), There([]))
+    contacts = hc.DeviceContacts(**rows, first_toc=time, hash=0, slices=None, layout=None, outputs={})
+    times = contacts.first_tocs.values
+    assert not hasattr(contacts, "points")
     assert times.dtype == np.float64 and times.tolist() == [time]
 
 

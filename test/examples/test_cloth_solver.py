@@ -106,8 +106,7 @@ class Blind(InProcess):
             vf_toc=found.vf_toc[none],
             ee=found.ee[none],
             ee_toc=found.ee_toc[none],
-            normals=found.normals[none],
-            closest=found.closest[none],
+            outputs={name: rows[none] for name, rows in found.outputs.items()},
         )
 
 

@@ -26,7 +26,7 @@ def assert_backend_same(backend, scene, t0, t1, **options):
         gpu = detector.detect(t0, t1)
         assert detector.stats["gpu_fallbacks"] == 0, detector.last_gpu_error
         assert detector.backend == backend
-        for name in ("vf", "ee", "vf_toc", "ee_toc", "points", "normals"):
+        for name in ("vf", "ee", "vf_toc", "ee_toc", *cpu.outputs):
             np.testing.assert_array_equal(getattr(gpu, name), getattr(cpu, name), err_msg=name)
         assert gpu.hash == cpu.hash
         assert gpu.first_toc == cpu.first_toc

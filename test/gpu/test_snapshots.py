@@ -24,7 +24,7 @@ def assert_near_same(cpu, gpu, vertices, distance):
     for _ in range(2):  # with a new tree, and with a refitted one
         found = gpu.proximity(vertices, distance)
         assert_on_gpu(gpu)
-        for name in ("vf", "vf_distance", "ee", "ee_distance", "closest"):
+        for name in ("vf", "vf_distance", "ee", "ee_distance", *expected.outputs):
             np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
         assert found.hash == expected.hash
     return expected

@@ -20,8 +20,8 @@ NEAR = hc.Proximity(
     vf_distance=np.array([0.5, 0.25]),
     ee=np.array([[1, 2, 10, 13], [4, 5, 6, 7]], np.uint32),
     ee_distance=np.array([0.0, 0.75]),
-    closest=np.arange(24.0).reshape(4, 2, 3),
     hash=2**64 - 5,
+    outputs={"closest": np.arange(24.0).reshape(4, 2, 3)},
 )
 HITS = hc.Intersections(ef=np.array([[1, 2, 9], [10, 13, 0], [14, 19, 19]], np.uint32), hash=7)
 

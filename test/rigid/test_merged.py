@@ -114,7 +114,9 @@ def test_pairs_that_were_not_cut():
 def test_without_contacts_and_without_outputs():
     none = hc.Contacts.none()
     found = merged([none, none, none], 3)
-    assert (len(found), found.first_toc, found.hash, found.points.shape) == (0, np.inf, none.hash, (0, 3))
+    assert (len(found), found.first_toc, found.hash, found.outputs) == (0, np.inf, none.hash, {})
+    with_points = hc.Contacts.none(outputs=("points",))
+    assert merged([with_points, with_points], 2).points.shape == (0, 3)
 
 
 def test_a_detector_that_reports_the_first_needs_no_later_parts():

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where each mesh lies in the scene-wide numbering of vertices and faces."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+Indices = NDArray[np.uint32]
+
+#: In local indices of a side that has one index only: no second index.
+NO_INDEX = 2**32 - 1
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class MeshLayout:
+    """Names of the K meshes in the order added, and offsets: (K+1,) int64, the last entry is the total."""
+
+    mesh_names: tuple[str, ...]
+    vertex_offsets: NDArray[np.int64]
+    face_offsets: NDArray[np.int64]
+
+    @property
+    def vertex_counts(self) -> list[int]:
+        """Number of vertices of each mesh."""
+        counts: list[int] = np.diff(self.vertex_offsets).tolist()
+        return counts
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Sides:
+    """Both sides of N pairs. mesh_a, mesh_b: (N,). local_a, local_b: (N, 2), local to the mesh; `NO_INDEX` where a
+    side, a vertex or a face, has one index."""
+
+    mesh_a: Indices
+    mesh_b: Indices
+    local_a: Indices
+    local_b: Indices
+
+    @classmethod
+    def zeros(cls, n: int) -> Sides:
+        """Room for n pairs."""
+        zeros = np.zeros
+        return cls(zeros(n, np.uint32), zeros(n, np.uint32), zeros((n, 2), np.uint32), zeros((n, 2), np.uint32))
+
+    def fill(self, layout: MeshLayout, vf: Indices, ee: Indices, ef: Indices) -> Sides:
+        """Write the sides of vertex-face, edge-edge and edge-face pairs in this order, to arrays full of zeros."""
+        count, n_vf, n_ee = len(vf) + len(ee) + len(ef), len(vf), len(ee)
+        of_vf, of_ee, of_ef = slice(n_vf), slice(n_vf, n_vf + n_ee), slice(n_vf + n_ee, count)
+        self.local_a[of_vf, 1] = self.local_b[of_vf, 1] = self.local_b[of_ef, 1] = NO_INDEX
+        vertices, faces = layout.vertex_offsets, layout.face_offsets
+        for rows, pairs, split, of_b in ((of_vf, vf, 1, faces), (of_ee, ee, 2, vertices), (of_ef, ef, 2, faces)):
+            localise(pairs[:, :split], vertices, self.mesh_a[rows], self.local_a[rows])
+            localise(pairs[:, split:], of_b, self.mesh_b[rows], self.local_b[rows])
+        return self
+
+
+def mesh_of(indices: NDArray[np.integer], offsets: NDArray[np.int64]) -> NDArray[np.intp]:
+    """The number of the mesh of each scene-wide index."""
+    return np.searchsorted(offsets, indices, side="right") - 1
+
+
+def localise(indices: Indices, offsets: NDArray[np.int64], mesh: Indices, local: Indices) -> None:
+    """Write the mesh of each row and its indices local to that; the entries of one row belong to one mesh.
+
+    indices: (n,k); mesh: (n,), full of zeros; local: (n, at least k).
+    """
+    if not len(indices):
+        return
+    # By columns: numpy is four times slower on many rows of one or two.
+    if len(offsets) == 2:  # one mesh: nothing to look up
+        for column in range(indices.shape[1]):
+            local[:, column] = indices[:, column]
+        return
+    mesh[...] = mesh_of(indices[:, 0], offsets)
+    # In the type of the indices: numpy would widen to 64 bits, at twice the time.
+    start = offsets.astype(indices.dtype)[mesh]
+    for column in range(indices.shape[1]):
+        np.subtract(indices[:, column], start, out=local[:, column])

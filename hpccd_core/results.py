@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What results share: outputs that a detector computes only if asked, and the meshes of each pair."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from .mesh_layout import Indices, MeshLayout, Sides
+from .options import OUTPUTS
+from .worlds import Slices
+
+Result = TypeVar("Result")
+Array = TypeVar("Array")
+
+
+class OutputNotComputed(ValueError, AttributeError):
+    """An output of a result was read that its detector was not asked for.
+
+    It is a ValueError, and an AttributeError too, so that ``hasattr(contacts, "normals")`` is False and
+    ``getattr(contacts, "normals", None)`` is None.
+
+    Examples
+    --------
+    >>> import hpccd_core as hc
+    >>> hc.Contacts.none().normals
+    Traceback (most recent call last):
+    ...
+    hpccd_core.results.OutputNotComputed: normals: not computed; make the detector with outputs=('normals',)
+    """
+
+
+def output(outputs: dict[str, Array], name: str) -> Array:
+    """The output of this name. Raises OutputNotComputed where it was not asked for."""
+    try:
+        return outputs[name]
+    except KeyError:
+        asked = (*outputs, name)
+        raise OutputNotComputed(f"{name}: not computed; make the detector with outputs={asked!r}") from None
+
+
+class WithSides:
+    """A result whose rows are pairs of features, each side of which belongs to one mesh."""
+
+    layout: MeshLayout | None
+
+    def _pairs(self) -> tuple[Indices, Indices, Indices]:
+        """vf, ee and ef."""
+        raise NotImplementedError
+
+    @functools.cached_property
+    def _sides(self) -> Sides:
+        if self.layout is None:
+            raise ValueError(
+                f"{type(self).__name__}: has no layout of meshes; use a result of a detector, or Scene.locate"
+            )
+        vf, ee, ef = self._pairs()
+        return Sides.zeros(len(vf) + len(ee) + len(ef)).fill(self.layout, vf, ee, ef)
+
+    @property
+    def mesh_a(self) -> Indices:
+        """(n,) uint32: the number of the mesh of side a of each row: of the vertex, or of edge a. `Scene.mesh_names`
+        has the names."""
+        return self._sides.mesh_a
+
+    @property
+    def mesh_b(self) -> Indices:
+        """(n,) uint32: the number of the mesh of side b of each row: of the face, or of edge b."""
+        return self._sides.mesh_b
+
+    @property
+    def local_a(self) -> Indices:
+        """(n, 2) uint32: side a in indices of its own mesh: the vertex and 2**32 - 1, or both vertices of the edge."""
+        return self._sides.local_a
+
+    @property
+    def local_b(self) -> Indices:
+        """(n, 2) uint32: side b in indices of its own mesh: the face and 2**32 - 1, or both vertices of the edge."""
+        return self._sides.local_b
+
+
+def with_outputs(found: dict[str, Any], outputs: tuple[str, ...]) -> dict[str, Any]:
+    """What the core returns, with the outputs that were asked for in a dict of their own."""
+    every = {name: found.pop(name) for name in OUTPUTS if name in found}
+    found["outputs"] = {name: array for name, array in every.items() if name in outputs}
+    return found
+
+
+def result_of(kind: Callable[..., Result], found: dict[str, Any], layout: MeshLayout | None) -> Result:
+    """The result of this kind from what the core returns."""
+    if slices := found.get("slices"):
+        found["slices"] = Slices(**slices)
+    return kind(**found, layout=layout)

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Python reference: examples run, sections are there, and help() is short."""
+
+import doctest
+import importlib
+import inspect
+import pkgutil
+import pydoc
+import re
+
+import pytest
+
+import hpccd_core as hc
+
+MODULES = ["hpccd_core", *(m.name for m in pkgutil.walk_packages(hc.__path__, "hpccd_core.") if "._core" not in m.name)]
+PUBLIC = {name: getattr(hc, name) for name in hc.__all__ if not name.startswith("_")}
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples_run(name):
+    found = doctest.testmod(importlib.import_module(name), optionflags=doctest.ELLIPSIS)
+    assert found.failed == 0
+
+
+def test_the_examples_are_found():
+    tests = [t for name in MODULES for t in doctest.DocTestFinder().find(importlib.import_module(name)) if t.examples]
+    assert {"Detector", "Scene", "Contacts", "icosphere"} <= {t.name.rpartition(".")[2] for t in tests}
+
+
+def callables():
+    for name, found in PUBLIC.items():
+        if inspect.isfunction(found):
+            yield name, found
+        elif inspect.isclass(found) and found.__module__.startswith("hpccd_core."):
+            for member, value in inspect.getmembers(found, inspect.isfunction):
+                if not member.startswith("_"):
+                    yield f"{name}.{member}", value
+
+
+@pytest.mark.parametrize("name, function", list(callables()))
+def test_arguments_are_documented_one_by_one(name, function):
+    doc = inspect.getdoc(function) or ""
+    arguments = [a for a in inspect.signature(function).parameters if a not in ("self", "cls", "unnamed", "unknown")]
+    if len(arguments) > 1:
+        section = re.search(r"^Parameters\n-+\n(.*?)(\n\n[A-Z][a-z]+\n-+\n|\Z)", doc, re.S | re.M)
+        assert section, f"{name}: no section Parameters"
+        listed = {word for line in re.findall(r"^(\w[\w, ]*) : ", section[1], re.M) for word in line.split(", ")}
+        assert listed == set(arguments), name
+    assert doc, f"{name}: no docstring"
+
+
+def test_help_of_the_detector_is_short():
+    summary = inspect.getdoc(hc.Detector)
+    assert len(summary.splitlines()) <= 100 and max(map(len, summary.splitlines())) <= 120
+    text = pydoc.render_doc(hc.Detector, renderer=pydoc.plaintext)
+    assert "Union[" not in text and "_NestedSequence" not in text
+    assert "detect(self, vertices_t0: 'Positions', vertices_t1: 'Positions', stream: 'Stream' = None)" in text
+    options = list(inspect.signature(hc.Detector).parameters)
+    listed = {word for line in re.findall(r"^(\w[\w, ]*) : ", summary, re.M) for word in line.split(", ")}
+    assert listed == set(options)

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Mistakes that users make in their first hour, and the words that help them on."""
+
+import copy
+import pickle
+import warnings
+
+import numpy as np
+import pytest
+
+import hpccd_core as hc
+
+CLOTH, CLOTH_FACES = hc.shapes.grid(2, 2)  # 9 vertices
+BALL, BALL_FACES = hc.shapes.icosphere(1)  # 12 vertices
+BOTH = np.concatenate([CLOTH, BALL])
+QUADS = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
+
+
+class Gradient:
+    """What a PyTorch tensor that requires a gradient does."""
+
+    def __array__(self, *args, **kwargs):
+        raise RuntimeError("Can't call numpy() on Tensor that requires grad. Use tensor.detach().numpy() instead.")
+
+
+def scene():
+    scene = hc.Scene()
+    scene.add_mesh("cloth", CLOTH_FACES)
+    scene.add_mesh("ball", BALL_FACES, static=True)
+    return scene
+
+
+def add(*args, **options):
+    return lambda: hc.Scene().add_mesh(*args, **options)
+
+
+def detector(**options):
+    return lambda: hc.Detector(scene(), **options)
+
+
+def detect(*args, **options):
+    return lambda: hc.Detector(scene(), **options).detect(*args)
+
+
+def changed(row, value):
+    vertices = BOTH.copy()
+    vertices[row] = value
+    return vertices
+
+
+MISTAKES = {
+    "quads as faces": (add("cloth", QUADS), r"faces: expected shape \(F, 3\), got \(2, 4\); triangulate quad.*reshape"),
+    "VTK's faces": (add("cloth", [3, 0, 1, 2, 3, 0, 2, 3]), r"VTK's format.*faces.reshape\(-1, 4\)\[:, 1:\]"),
+    "polygons as faces": (add("cloth", [[0, 1, 2, 3, 4]]), "triangulate polygons first"),
+    "edges as faces": (add("rope", [[0, 1], [1, 2]]), r"faces: .*got \(2, 2\); give segments as edges="),
+    "faces as edges": (add("rope", edges=[[0, 1, 2]]), r"edges: .*got \(1, 3\); give triangles as faces"),
+    "faces in columns": (add("cloth", CLOTH_FACES.T), r"faces: .*got \(3, 8\); transpose it: faces\.T"),
+    "flat faces": (add("cloth", CLOTH_FACES.ravel()), r"faces: .*got \(24,\); reshape it: faces\.reshape\(-1, 3\)"),
+    "vertices, then faces": (add("cloth", CLOTH, CLOTH_FACES), r"takes a name and faces; vertices are given to detect"),
+    "vertices as faces": (add("ball", BALL), "faces: expected integers.*look like positions.*detect"),
+    "faces as floats": (add("cloth", CLOTH_FACES.astype(float)), r"convert with faces\.astype\(numpy\.uint32\)"),
+    "faces from 1": (add("cloth", CLOTH_FACES + 1, n_vertices=9), "is 9, but mesh 'cloth' has 9 vertices"),
+    "number as name": (add(3, CLOTH_FACES), "name: expected a string, got int"),
+    "unnamed option": (lambda: hc.Detector(scene(), "fast"), "options are given by name, as in accuracy='exact'"),
+    "another option's name": (detector(min_separation=0.1), "no option 'min_separation'.*did you mean 'minimum_sep"),
+    "unknown option": (detector(colour=1), r"no option 'colour'; help\(hpccd_core.Detector\) lists them$"),
+    "misspelled choice": (detector(accuracy="Exakt"), "'Exakt' is not known.*did you mean 'exact'"),
+    "output in singular": (detector(outputs="normal"), "outputs: 'normal' is not known.*did you mean 'normals'"),
+    "hyphen for underscore": (detector(features="vertex-face"), "did you mean 'vertex_face'"),
+    "misspelled mesh": (lambda: scene().ignore_pair("cloth", "Ball"), "no mesh is named 'Ball'.*did you mean 'ball'"),
+    "faces for a scene": (
+        lambda: hc.Detector(CLOTH_FACES),
+        r"scene: expected hpccd_core.Scene.*Scene\(\) and",
+    ),
+    "one mesh of two": (detect(CLOTH, CLOTH), r"vertices_t0: expected shape \(21, 3\).*may be of mesh 'cloth' alone"),
+    "too many rows": (detect(BOTH, np.vstack([BOTH, CLOTH])), r"vertices_t1: .*got \(30, 3\); .*n_vertices="),
+    "(3, V)": (detect(BOTH.T, BOTH.T), r"vertices_t0: .*got \(3, 21\); transpose it: vertices_t0\.T"),
+    "two coordinates": (detect(BOTH[:, :2], BOTH), r"got \(21, 2\); add a third coordinate: numpy\.pad\(vertices_t0,"),
+    "four coordinates": (detect(BOTH, BOTH[:, [0, 1, 2, 0]]), r"vertices_t1: .*leave out the fourth coordinate"),
+    "flat positions": (detect(BOTH.ravel(), BOTH), r"got \(63,\); reshape it: vertices_t0\.reshape\(21, 3\)"),
+    "worlds without worlds=": (detect(BOTH[None], BOTH[None]), r"got \(1, 21, 3\); .*worlds="),
+    "one world of two": (detect(BOTH, BOTH, worlds=2), r"got \(21, 3\); give the positions of every world"),
+    "integers": (
+        detect(BOTH.astype(int), BOTH),
+        r"int64; convert with vertices_t0\.astype\(numpy\.float64\)",
+    ),
+    "lists of integers": (detect([[0, 0, 0]] * 21, BOTH), r"convert with numpy\.asarray\(vertices_t0, float\)"),
+    "a tensor with a gradient": (detect(Gradient(), BOTH), r"vertices_t0: .*tensor\.detach\(\)"),
+    "NaN": (detect(changed(2, np.nan), BOTH), r"vertices_t0\[2, 0\] is NaN"),
+    "a static mesh that moves": (detect(BOTH, BOTH + 1), r"vertices_t1\[9\]: .*mesh 'ball'.*static"),
+    "dict, misspelled mesh": (
+        detect({"Cloth": CLOTH, "ball": BALL}, BOTH),
+        "no mesh is named 'Cloth'.*you mean 'cloth'",
+    ),
+    "dict, missing mesh": (detect(BOTH, {"cloth": CLOTH}), "vertices_t1: has no positions of mesh 'ball'; give"),
+    "dict, swapped meshes": (
+        detect({"cloth": BALL, "ball": CLOTH}, BOTH),
+        r"vertices_t0\['cloth'\]: expected .*\(9, 3\)",
+    ),
+    "normals that were not asked for": (
+        lambda: detect(BOTH, BOTH)().normals,
+        r"normals: not computed; make the detector with outputs=\('normals',\)",
+    ),
+    "a pickled detector": (lambda: pickle.dumps(detector()()), "cannot be pickled.*pickle its Scene"),
+    "a copied detector": (lambda: copy.deepcopy(detector()()), "cannot be pickled or copied"),
+    "an index beyond": (lambda: scene().locate(21), r"vertex: must lie in \[0, 20\], got 21"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_the_error_names_the_remedy(mistake):
+    call, words = MISTAKES[mistake]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises((TypeError, ValueError), match=words) as raised:
+            call()
+    assert len(str(raised.value)) < 300
