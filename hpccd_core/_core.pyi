@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The compiled module (src/bindings.cpp and its neighbours). Names and arguments are compared with it by
-test/packaging/test_core_stub.py, which tells how to draw up anew what pybind11 itself says of them."""
+"""The compiled module (src/bindings.cpp and its neighbours). test/packaging/test_core_stub.py compares names and
+arguments with it, and names the command that prints the stub of pybind11."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar, NoReturn, NotRequired, TypedDict, overload
@@ -127,11 +127,19 @@ class Positions:
 _Given = Positions | NDArray[Any]
 
 class DeviceArray:
-    """A C-contiguous array in a GPU's memory, complete, which is held as long as anybody looks at it."""
+    """A C-contiguous array in a GPU's memory. Arrays made of it by CUDA array interface or DLPack keep it alive.
 
-    def __init__(self, *args: Any, **kwargs: Any) -> None: ...  # raises TypeError: answers hold them
+    Attributes
+    ----------
+    shape : tuple of int
+    dtype : numpy.dtype
+    device : int
+        Number of the GPU in CUDA.
+    """
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None: ...  # raises TypeError: results hold them
     def __len__(self) -> int: ...
-    def __array__(self, dtype: object = ..., copy: object = ...) -> NoReturn: ...  # numpy is told of to_host
+    def __array__(self, dtype: object = ..., copy: object = ...) -> NoReturn: ...  # its error names to_host
     def __dlpack__(
         self, *, stream: object = ..., max_version: object = ..., dl_device: object = ..., copy: object = ...
     ) -> Any: ...
@@ -156,7 +164,7 @@ class _SlicesOnDevice(TypedDict):
     hashes: DeviceArray
     first_tocs: DeviceArray | None
 
-class _OnDevice(TypedDict):  # of every query; what it does not have is empty
+class _OnDevice(TypedDict):  # result of every query; arrays that a query does not have are empty
     vf: DeviceArray
     ee: DeviceArray
     ef: DeviceArray
@@ -224,16 +232,16 @@ class JointKind(_Enumeration):
     sliding: ClassVar[JointKind]
 
 class JointChain:
-    """The joints of a robot in the order of their tree; parent -1: the base. numbers (m,11): of each the quaternion
-    x y z w and the shift of its origin, its axis, and no less than the length of that shift."""
+    """The joints of a robot in the order of their tree; parent -1 is the base. numbers (m,11): for each joint the
+    quaternion x y z w and the shift of its origin, its axis, and an upper bound on the length of that shift."""
 
     def __init__(self, kinds: Sequence[JointKind], parents: Sequence[int], numbers: NDArray[np.float64]) -> None: ...
     def poses(
         self, values: NDArray[np.float64], turn: NDArray[np.float64], shift: NDArray[np.float64]
-    ) -> NDArray[np.float64]: ...  # (m,7): quaternion and shift; turn, shift: where the base is
+    ) -> NDArray[np.float64]: ...  # (m,7): quaternion and shift; turn, shift: pose of the base
 
 class JointBounds:
-    """Of a step in which joints go at constant speed."""
+    """Bounds of a step in which joints move at constant speed."""
 
     def __init__(
         self,
@@ -270,7 +278,7 @@ class StandardArithmetic:  # a context manager: the standard floating-point mode
 def widened(array: NDArray[np.float32]) -> NDArray[np.float64]: ...
 def placed(
     poses: NDArray[np.float64], meshes: Sequence[tuple[int, int]], vertices: NDArray[np.float64]
-) -> NDArray[np.float64]: ...  # meshes: of each the number of its pose, and where its vertices end
+) -> NDArray[np.float64]: ...  # meshes: for each the number of its pose, and the end of its vertices
 def integers_on_device(numbers: Sequence[int], device: int) -> DeviceArray: ...
 def gpu_status() -> GpuStatus: ...
 def gpu_fail_after(calls: int) -> None: ...

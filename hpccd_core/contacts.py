@@ -80,9 +80,9 @@ class Contacts(WithSides, PairsOfWorlds):
     def points(self) -> NDArray[np.float64]:
         """(N+M, 3) float64, vertex-face first: where the sides touch at their time of impact.
 
-        It is the vertex, or the point of the shorter edge where the other crosses it; for parallel edges the middle of
-        the stretch they share. With a minimum separation it is the midpoint of the nearest points. Raises
-        `OutputNotComputed` unless the detector was made with outputs=("points",).
+        It is the vertex, or the point of the shorter edge where the other crosses it; for edges that are parallel
+        during the whole step the middle of the stretch they share. With a minimum separation it is the midpoint of the
+        nearest points. Raises `OutputNotComputed` unless the detector was made with outputs=("points",).
         """
         return output(self.outputs, "points")
 

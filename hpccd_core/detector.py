@@ -100,7 +100,7 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
     restructure : bool
         Whether "published" and "naive" restructure their hierarchies.
     hybrid_segments, hybrid_segment_pairs : int
-        Backend "hybrid": segments of its queue, and pairs of leaves in each.
+        Backend "hybrid": segments of the queue between CPU threads and GPUs, and pairs of leaves in each.
     gpus : int
         Backend "hybrid": number of GPUs; 0 for all.
 
@@ -341,6 +341,11 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
             Names or numbers of the meshes; the same mesh twice: within it.
         separation : float
             Euclidean distance in the unit of the coordinates; 0 reports only contact.
+
+        Notes
+        -----
+        Up to 256 meshes, separations are one table. Beyond that, memory and the cost of a change grow with the number
+        of pairs that were set; on GPUs, if pairs differ, with the square of the number of meshes.
         """
         a, b = (arguments.mesh_number(n, m, self._mesh_numbers) for n, m in (("mesh_a", mesh_a), ("mesh_b", mesh_b)))
         self._core.set_separation(a, b, arguments.length("separation", separation))
@@ -397,8 +402,14 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
 
     @property
     def stats(self) -> dict[str, int]:
-        """Counts of the last call: candidate pairs, pairs culled by each filter, contacts, bytes used; empty if it
-        failed."""
+        """Counts of the last call; empty if it failed.
+
+        Candidate pairs, pairs that each filter culled (`vf_rejected_kdop`, `ee_rejected_kdop`: the k-DOP filter, bounds
+        along eight directions beside the axes), contacts, bytes used. `leaf_pairs_ns` (one in 64 is timed) and
+        `kdop_ns` are parts of the stages traverse and elementary, summed over threads. With worlds, counts are sums,
+        `worlds` is their number, and `waiting` the time of threads without a world. `gpu_fallbacks` counts frames that
+        the CPU computed after a failure of the GPU.
+        """
         return self._core.stats()
 
 

@@ -115,7 +115,7 @@ class DeviceContacts(_PairsOnDevice):
     """Contacts in a GPU's memory: names, shapes, dtypes and order as in :class:`Contacts`.
 
     Arrays are :class:`DeviceArray`: CUDA array interface and DLPack, without a copy (``cupy.asarray(c.vf)``,
-    ``torch.from_dlpack(c.vf_toc)``). Their memory is reused only when nobody holds them any more. `first_toc` and
+    ``torch.from_dlpack(c.vf_toc)``). Their memory is reused only after all of them are released. `first_toc` and
     `hash` are on the host. :meth:`world` returns rows of these arrays in place, except for outputs, which are copied.
     """
 

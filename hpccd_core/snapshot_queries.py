@@ -101,6 +101,12 @@ class SnapshotQueries(Generic[OfNear, OfPierced, OfNearest]):
         ------
         TypeError, ValueError
             As :meth:`detect` raises.
+
+        Notes
+        -----
+        Of several nearest pairs whose distances are the same double, the first in canonical order is returned. Which
+        of two pairs at the same exact distance is rounded to the smaller double is unspecified, but the same on every
+        machine.
         """
         names = self._layout.mesh_names
         gaps = [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The node's topic stop as one answer, which is true wherever nobody says that it is false."""
+"""The node's stop topic as one flag, which is false only while a recent message says so."""
 
 import threading
 from collections.abc import Callable
@@ -15,17 +15,16 @@ from std_msgs.msg import Bool
 from hpccd_ros.base.clocks import CLOCK_ERROR, Clocks, ClockWatch
 from hpccd_ros.client.topics import STOP_TIMEOUT, STOP_TOPIC, stop_qos
 
-# Of the time-out, as the node takes it too: a silence reads as true before it is over.
+# Fraction of the time-out, the same in the node: silence reads as true before the time-out is over.
 _IN_TIME = 0.95
-# Of each time-out the callback looks so often whether it has passed.
+# Times per time-out at which a timer checks whether it has passed.
 _LOOKS = 4
 
 
 class StopListener:
-    """Listens to ``topic`` in ``node``, whose executor is the user's: SingleThreadedExecutor or MultiThreadedExecutor.
-    (rclpy's experimental EventsExecutor fails, in Jazzy, at every callback that asks when its message came.)
+    """Listens to the node's stop topic; ``stop`` is true whenever the robot must stop.
 
-    ``stop`` is false only if a message sent less than ``stop_timeout`` seconds ago said so, and at least ``publishers``
+    ``stop`` is false only if a message sent less than ``stop_timeout`` seconds ago says so, and at least ``publishers``
     publishers are alive. The age of a message is the system time minus its DDS source timestamp: a process that was
     suspended, or that started late and receives the latched message, does not accept an old message as new. ``stop``
     can be read at any time from any thread, and also becomes true if the executor runs no callbacks. A message from
@@ -35,15 +34,15 @@ class StopListener:
     Parameters
     ----------
     node : rclpy.node.Node
-        Whose executor takes the messages.
+        Node that subscribes. Its executor must be a SingleThreadedExecutor or a MultiThreadedExecutor: in Jazzy,
+        rclpy's experimental EventsExecutor fails at callbacks that ask for the time of their message.
     topic : str
-        Name of the topic, which the node resolves.
+        Name of the topic, relative to the namespace of `node`.
     stop_timeout : float
-        Seconds, at least those of the node's parameter; with less nothing is ever heard.
+        Seconds, at least those of the node's parameter; with less, no message arrives.
     publishers : int
-        How many must be alive on the topic. Set it to the number that there are: with fewer, one that was not heard yet
-        is not missed. Of those that were heard, any that says true within ``stop_timeout`` makes it true; a message
-        does not tell whose it is.
+        Number of publishers that must be alive on the topic. Give the true number: with a smaller one, a publisher that
+        was never heard is not missed. A true from any of them within ``stop_timeout`` makes ``stop`` true.
     on_change : callable, optional
         Called by the executor with this listener after ``stop`` changed: at messages and events at once, at a time-out
         when a timer looks, four times in each; not at all while the executor stands still.
@@ -53,7 +52,7 @@ class StopListener:
     Raises
     ------
     TypeError, ValueError
-        For wrong arguments.
+        If an argument has the wrong type or range.
     """
 
     def __init__(
@@ -103,16 +102,16 @@ class StopListener:
 
     @property
     def stop(self) -> bool:
-        """Whether to stop."""
+        """Whether the robot must stop."""
         return self._why() is not None
 
     @property
     def reason(self) -> str:
-        """Why, in a sentence; what it is that the publisher knows is on /diagnostics. Empty where ``stop`` is false."""
+        """Why ``stop`` is true, in a sentence; empty if it is false. /diagnostics has the cause that the node knows."""
         return self._why() or ""
 
     def close(self) -> None:
-        """Hear no more: ``stop`` is true from now on."""
+        """End the subscription: ``stop`` is true from now on."""
         self._lose("the listener was closed")
         self._node.destroy_timer(self._timer)
         self._node.destroy_subscription(self._subscription)
