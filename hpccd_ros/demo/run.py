@@ -214,11 +214,15 @@ def _state(monitor) -> str:
 
 
 def _verify_and_draw(args, scene, folder, path, picture, console):
+    from hpccd_ros.picture.intersecting import IntersectingFaces
     from hpccd_ros.picture.of_recording import History, draw_step
+    from hpccd_ros.picture.visual_geometry import VisualGeometry
 
     history, worst = History(), None
     with Recording(path) as recording:
-        replay = Replay(recording, recorded_setup.of_recording(recording), threads=args.threads, outputs=("points",))
+        setup = recorded_setup.of_recording(recording)
+        drawn = {"visual": VisualGeometry(setup.visual()), "intersecting": IntersectingFaces(setup.builder)}
+        replay = Replay(recording, setup, threads=args.threads, outputs=("points",))
         for step in replay.steps():
             if step.contacts is None:
                 continue
@@ -234,7 +238,7 @@ def _verify_and_draw(args, scene, folder, path, picture, console):
         )
     console.print(f"[bold]verified[/]   {replay.verified} recorded answers, computed again from the file: all equal")
     console.print("[bold]picture[/]    rendering the frame with most contacts ...")
-    draw_step(worst, picture, history, title=scene.title)
+    draw_step(worst, picture, history, title=scene.title, **drawn)
     return worst
 
 

@@ -2,16 +2,20 @@
 """The picture of one step: shaded meshes, contacts as points coloured by their time, and the step in its context."""
 
 import dataclasses
+from collections import Counter
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
+from hpccd_ros.base.quoting import shortened
 from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.picture.camera import Camera
 from hpccd_ros.picture.raster import rasterize
 from hpccd_ros.picture.shading import RADIUS, shade, tubes
+from hpccd_ros.picture.tint import Tint
 
 BACKGROUND = "#10141c"
 INK = "#e8ecf4"
@@ -20,26 +24,28 @@ FAINT = "#8a93a6"
 MESH_COLOURS = ("#56759f", "#c3c9d4", "#5f8f83", "#7f8aa8", "#8fa3b8", "#a0937d")
 # From the start of the step to its end; light enough at both ends to be seen on any of the above.
 TOC_COLOURS = LinearSegmentedColormap.from_list("toc", ["#fff38a", "#ffb52e", "#ff5f45", "#f03fa0", "#b46bff"])
+# Of faces that intersect another mesh.
+INTERSECTING = "#2fd3ab"
 SUPERSAMPLING = 2
-TINT = 0.62
+MOST_NAMES = 8  # in the legend
 LIGHT = np.array([0.35, -0.55, 1.25])
 
 
 @dataclasses.dataclass
 class Picture:
     """What is drawn of a step: name of each mesh, its vertices in the middle of the step, its faces, and its edges
-    beside theirs; contacts at their points (N,3).
+    beside theirs; contacts at their points (N,3), and their times of impact.
 
-    touched: (V,) earliest time of contact of each vertex, all meshes one after the other; inf where it has none.
+    intersecting: (F,) which faces of all meshes, one after the other, intersect another mesh; None: not known.
     """
 
     meshes: list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]
-    touched: np.ndarray
     points: np.ndarray
     toc: np.ndarray
     title: str
     facts: list[str]
     scene: str = ""  # name, at the right of the title
+    intersecting: np.ndarray | None = None
 
 
 @dataclasses.dataclass
@@ -61,7 +67,8 @@ def draw(picture: Picture, path, history: History | None = None, **view) -> None
 def compose(picture: Picture, history: History | None = None, *, azimuth=-60.0, elevation=26.0, size=(1280, 860)):
     """The picture as a matplotlib figure; size: of its scene, pixels."""
     picture = _of_drawable_size(picture)
-    image, camera, depth = render(picture.meshes, picture.touched, size, azimuth, elevation)
+    contacts = (picture.points, picture.toc)
+    image, camera, depth = render(picture.meshes, size, azimuth, elevation, contacts, picture.intersecting)
     figure = Figure(figsize=(16, 9), dpi=120, facecolor=BACKGROUND)
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.13, 0.80, 0.77))
@@ -83,12 +90,18 @@ def _of_drawable_size(picture: Picture) -> Picture:
     return dataclasses.replace(picture, meshes=meshes, points=np.ldexp(picture.points, exponent))
 
 
-def render(meshes, touched, size, azimuth, elevation):
-    """(image (h,w,4) sRGB with alpha, camera, depth (h,w)) of meshes [(name, vertices, faces, edges)]."""
+def render(meshes, size, azimuth, elevation, contacts=None, intersecting=None):
+    """(image (h,w,4) sRGB with alpha, camera, depth (h,w)) of meshes [(name, vertices, faces, edges)].
+
+    contacts: (points (N,3), times of impact (N,)), around which surfaces are tinted. intersecting: as of `Picture`.
+    """
     vertices = np.concatenate([np.asarray(v, dtype=np.float64) for _, v, *_ in meshes])
     sizes = [len(v) for _, v, *_ in meshes]
     faces, edges = (scene_indices([mesh[i] for mesh in meshes], sizes) for i in (2, 3))
-    colours = vertex_colours(sizes, faces, edges, touched)
+    colours = np.repeat(
+        [linear(to_rgb(colour)) for colour in mesh_colours([name for name, *_ in meshes])], sizes, axis=0
+    )
+    paint = _paint(vertices, faces, contacts, intersecting)
     extent = float(np.ptp(vertices, axis=0).max())
     around, sides, coloured_as = tubes(vertices, edges, RADIUS * extent)
     faces = np.concatenate([faces, sides + len(vertices)])
@@ -103,7 +116,7 @@ def render(meshes, touched, size, azimuth, elevation):
             [0, 0, 1],
         ]
     )
-    shaded = shade(buffers, camera, vertices, faces, colours, light)
+    shaded = shade(buffers, camera, vertices, faces, colours, light, paint)
     alpha = (buffers.triangle >= 0).astype(np.float64)[..., None]
     shaded = np.concatenate([shaded, alpha], axis=2)
     h, w = size[1], size[0]
@@ -119,29 +132,39 @@ def scene_indices(indices, sizes):
     return np.concatenate([np.asarray(i, np.int64) + offset for i, offset in zip(indices, offsets, strict=False)])
 
 
-def vertex_colours(sizes, faces, edges, touched):
-    """(V,3) linear RGB: the meshes' own colours, tinted around the contacts. sizes: vertices of each mesh; faces (F,3),
-    edges (E,2) beside theirs and touched (V,) of all meshes together."""
-    owner = np.repeat(np.arange(len(sizes)), sizes)
-    own = np.array([linear(to_rgb(MESH_COLOURS[i % len(MESH_COLOURS)])) for i in range(len(sizes))])[owner]
-    glow, weight = _glow(touched, faces, edges)
-    return (1 - TINT * weight[:, None]) * own + TINT * glow
+def mesh_groups(names) -> list[str]:
+    """Of each mesh what it is a part of: links ROBOT/LINK of their robot, others of themselves."""
+    robots = [name.partition("/")[0] for name in names]
+    links = Counter(robots)
+    return [robot if links[robot] > 1 else name for robot, name in zip(robots, names, strict=True)]
 
 
-def _glow(touched, faces, edges):
-    """(V,3) colour times weight, and (V,) weight 0..1 of a tint around the contacts, so that contacts between layers
-    show on the outside of the layers. Spread twice over the edges, or single vertices would make stars."""
-    contact = np.isfinite(touched)
-    values = np.zeros((len(touched), 4))
-    values[contact, :3] = linear(TOC_COLOURS(touched[contact])[:, :3])
-    values[contact, 3] = 1.0
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]], edges])
-    a, b = np.concatenate([edges, edges[:, ::-1]]).T
-    degree = np.maximum(np.bincount(a, minlength=len(touched)), 1)[:, None]
-    for _ in range(2):
-        around = np.stack([np.bincount(a, values[b, k], minlength=len(touched)) for k in range(4)], axis=1) / degree
-        values = 0.5 * (values + around)
-    return values[:, :3], values[:, 3]
+def mesh_colours(names) -> list[str]:
+    """Of each mesh, the links of a robot alike."""
+    groups = mesh_groups(names)
+    number = {group: k for k, group in enumerate(dict.fromkeys(groups))}
+    return [MESH_COLOURS[number[group] % len(MESH_COLOURS)] for group in groups]
+
+
+def toc_colours(toc) -> np.ndarray:
+    """(N,3) linear RGB."""
+    return linear(TOC_COLOURS(np.asarray(toc))[:, :3])
+
+
+def _paint(vertices, faces, contacts, intersecting):
+    """What `shade` takes as `paint`."""
+    points, toc = contacts or (np.empty((0, 3)), np.empty(0))
+    tint = Tint(np.asarray(points, np.float64).reshape(-1, 3), toc_colours(toc), vertices)
+    # The last one is that of all further triangles: tubes around edges.
+    marked = np.append(np.zeros(len(faces), bool) if intersecting is None else intersecting, False)
+
+    def paint(position, triangle, own):
+        painted = tint.applied(position, own)
+        if marked.any():
+            painted[marked[np.minimum(triangle, len(marked) - 1)]] = linear(to_rgb(INTERSECTING))
+        return painted
+
+    return paint
 
 
 def _draw_scene(axes, image, camera, depth, picture):
@@ -171,16 +194,37 @@ def _write_title(figure, picture):
     figure.text(0.03, 0.945, picture.title, color=INK, fontsize=21, fontweight="bold", va="center")
     figure.text(0.97, 0.945, picture.scene, color=INK, fontsize=14, va="center", ha="right")
     figure.text(0.03, 0.905, "   ·   ".join(picture.facts), color=FAINT, fontsize=11.5, va="center")
+    names = [name for name, *_ in picture.meshes]
+    colours = dict(zip(mesh_groups(names), mesh_colours(names), strict=True))
+    if picture.intersecting is not None and picture.intersecting.any():
+        colours["faces that intersect another mesh"] = INTERSECTING
+    if len(colours) <= MOST_NAMES:
+        figure.legend(
+            handles=[Patch(color=colour) for colour in colours.values()],
+            labels=[shortened(name, 40) for name in colours],
+            loc="upper left",
+            bbox_to_anchor=(0.022, 0.892),
+            ncols=len(colours),
+            frameon=False,
+            labelcolor=FAINT,
+            fontsize=11,
+            handlelength=0.9,
+            handleheight=0.9,
+            columnspacing=1.6,
+        )
 
 
 def _draw_times(axes, picture):
+    if not len(picture.toc):
+        _say(axes, "Nothing touches\nin this step.")
+        return
     edges = np.linspace(0, 1, 41)
     counts = np.histogram(picture.toc, edges)[0]
     middle = (edges[1:] + edges[:-1]) / 2
     axes.barh(middle, counts, height=0.9 / 40, color=TOC_COLOURS(middle))
     axes.set_ylim(0, 1)
     axes.set_facecolor(BACKGROUND)
-    axes.set_title("time of contact", color=INK, fontsize=12, pad=12)
+    axes.set_title("time of impact", color=INK, fontsize=12, pad=12)
     axes.yaxis.tick_right()
     axes.set_yticks([0, 0.25, 0.5, 0.75, 1], ["0  start", "¼", "½", "¾", "1  end"])
     axes.set_xlabel("contacts", color=FAINT, fontsize=9)
@@ -189,8 +233,17 @@ def _draw_times(axes, picture):
     _style(axes)
 
 
+def _say(axes, sentence):
+    """A sentence in place of a chart that would be empty."""
+    axes.set_axis_off()
+    axes.text(0.5, 0.5, sentence, transform=axes.transAxes, ha="center", va="center", color=FAINT, fontsize=12)
+
+
 def _draw_history(axes, history):
     axes.set_facecolor(BACKGROUND)
+    if not history.contacts.any():
+        _say(axes, f"Nothing touches in any of the {len(history.frames):,} steps.")
+        return
     axes.fill_between(history.frames, history.contacts, step="mid", color="#e0668c", alpha=0.35, linewidth=0)
     axes.step(history.frames, history.contacts, where="mid", color="#e0668c", linewidth=1.2)
     axes.axvline(history.marked, color=INK, linewidth=1, alpha=0.8)
@@ -202,9 +255,23 @@ def _draw_history(axes, history):
     if history.milliseconds is not None:
         times = axes.twinx()
         times.plot(history.frames, history.milliseconds, color="#7fd1e0", linewidth=1.2)
-        times.set_ylim(0, np.nanmax(history.milliseconds) * 1.15)
+        top = usual_ceiling(history.milliseconds)
+        times.set_ylim(0, top)
+        most = int(np.nanargmax(history.milliseconds))
+        if history.milliseconds[most] > top:
+            at, text = (history.frames[most], 1.0), f"\u2191 {history.milliseconds[most]:.3g} ms"
+            times.annotate(
+                text, at, (3, 1), "offset points", xycoords=("data", "axes fraction"), color="#7fd1e0", fontsize=8
+            )
         times.set_ylabel("ms a frame", color="#7fd1e0", fontsize=9)
         _style(times)
+
+
+def usual_ceiling(values) -> float:
+    """Upper end of an axis that the largest 5 % of the values, such as those of a warm-up, do not rule."""
+    values = np.sort(np.asarray(values, float)[np.isfinite(values)])
+    usual = values[: max(1, len(values) - max(1, len(values) // 20))][-1]
+    return 1.15 * values[-1] if values[-1] < 2.5 * usual else 1.5 * usual
 
 
 def _style(axes):

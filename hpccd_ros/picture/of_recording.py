@@ -6,7 +6,8 @@ import numpy as np
 from hpccd_core.options import FEATURES
 from hpccd_ros.detect.separation import Separation
 from hpccd_ros.picture import contacts as picture
-from hpccd_ros.picture.contacts import scene_indices
+from hpccd_ros.picture.intersecting import IntersectingFaces
+from hpccd_ros.picture.visual_geometry import NO_VISUAL, VisualGeometry
 from hpccd_ros.replay.recomputed import ReplayedStep
 
 
@@ -22,19 +23,29 @@ class History:
         self.milliseconds.append(step.milliseconds)
 
 
-def draw_step(step: ReplayedStep, path, history: History | None = None, *, title: str, **view) -> None:
+def draw_step(
+    step: ReplayedStep,
+    path,
+    history: History | None = None,
+    *,
+    title: str,
+    visual: VisualGeometry = NO_VISUAL,
+    intersecting: IntersectingFaces | None = None,
+    **view,
+) -> None:
     """Write a picture of `step`, which was computed with outputs=("points",). view: azimuth, elevation, size."""
     found = step.contacts
-    meshes, offsets = meshes_in_the_middle(step), step.layout.vertex_offsets
+    meshes = meshes_in_the_middle(step, visual)
+    marked = None if intersecting is None else _marked(intersecting, step, meshes)
     of = f" of {max(history.steps)}" if history is not None else ""
     drawn = picture.Picture(
         meshes,
-        touched(found, scene_indices([faces for _, _, faces, _ in meshes], np.diff(offsets)), offsets[-1]),
         np.asarray(found.points),
         np.concatenate([found.vf_toc, found.ee_toc]),
         f"{step.total:,} contact{'' if step.total == 1 else 's'} in step {step.step}" + of,
         facts(step),
         title,
+        marked,
     )
     context = None
     if history is not None and len(history.steps) > 1:
@@ -75,25 +86,33 @@ def features_fact(features: tuple[str, ...]) -> str | None:
     return None if features == FEATURES else f"only {' '.join(features).replace('_', '-')}"
 
 
-def meshes_in_the_middle(step: ReplayedStep):
+def _marked(intersecting: IntersectingFaces, step: ReplayedStep, meshes) -> np.ndarray:
+    """(F,) which of the drawn faces intersect another mesh; those of visual geometry do not."""
+    names, topologies = step.layout.mesh_names, step.end_frame.topologies
+    places = [vertices for _, vertices, *_ in meshes_in_the_middle(step)]
+    of_mesh = dict(zip(names, zip(topologies, intersecting.of(topologies, places), strict=True), strict=True))
+    return np.concatenate(
+        [
+            of_mesh[name][1] if name in of_mesh and of_mesh[name][0].faces is faces else np.zeros(len(faces), bool)
+            for name, _, faces, _ in meshes
+        ]
+    )
+
+
+def meshes_in_the_middle(step: ReplayedStep, visual: VisualGeometry = NO_VISUAL):
     """[(name, vertices (V,3), faces (F,3), edges (E,2) beside theirs)] in the middle of the step, so that contacts at
-    any time of it lie close to the surfaces."""
-    start, end = step.start_frame, step.end_frame
+    any time of it lie close to the surfaces. Robots by their visual geometry."""
+    start, end, names = step.start_frame, step.end_frame, step.layout.mesh_names
+    before, after = (dict(zip(names, frame.vertices, strict=True)) for frame in (start, end))
+    topologies = dict(zip(names, end.topologies, strict=True)) | visual.topologies
+    before, after = before | visual.vertices(names, start), after | visual.vertices(names, end)
     return [
-        (name, 0.5 * np.asarray(v0, np.float64) + 0.5 * np.asarray(v1, np.float64), topology.faces, topology.edges)
-        for name, v0, v1, topology in zip(
-            step.layout.mesh_names, start.vertices, end.vertices, end.topologies, strict=True
+        (
+            name,
+            0.5 * np.asarray(before[name], np.float64) + 0.5 * np.asarray(vertices, np.float64),
+            topologies[name].faces,
+            topologies[name].edges,
         )
+        for name, vertices in after.items()
+        if name in before
     ]
-
-
-def touched(found, faces, n_vertices):
-    """(V,) earliest time of contact of each vertex: its own, that of an edge it ends, or of a face around it."""
-    earliest = np.full(n_vertices, np.inf)
-    for vertices, toc in (
-        (found.vf[:, :1], found.vf_toc),
-        (faces[found.vf[:, 1]], found.vf_toc),
-        (found.ee, found.ee_toc),
-    ):
-        np.minimum.at(earliest, vertices, toc[:, None])
-    return earliest

@@ -2,11 +2,14 @@
 """Steps of a replayed recording as a Rerun recording: meshes, contacts by their time, normals, curves, timelines."""
 
 import numpy as np
+from matplotlib.colors import to_rgb
 
 from hpccd_ros.base import extras
-from hpccd_ros.picture.contacts import TOC_COLOURS, scene_indices, srgb, vertex_colours
-from hpccd_ros.picture.of_recording import meshes_in_the_middle, touched
+from hpccd_ros.picture.contacts import TOC_COLOURS, linear, mesh_colours, srgb, toc_colours
+from hpccd_ros.picture.of_recording import meshes_in_the_middle
 from hpccd_ros.picture.shading import RADIUS, vertex_normals
+from hpccd_ros.picture.tint import Tint
+from hpccd_ros.picture.visual_geometry import NO_VISUAL, VisualGeometry
 from hpccd_ros.replay.recomputed import ReplayedStep
 
 # Parts of the largest extent of the first step's scene.
@@ -28,7 +31,7 @@ class RerunWriter:
     Raises UserError where rerun-sdk is not installed, OSError where `path` cannot be written.
     """
 
-    def __init__(self, title: str, path=None, *, azimuth=-60.0, elevation=26.0):
+    def __init__(self, title: str, path=None, *, azimuth=-60.0, elevation=26.0, visual: VisualGeometry = NO_VISUAL):
         self._rr = rr = need_rerun()
         self._stream = rr.RecordingStream("hpccd")
         if path is None:
@@ -40,6 +43,7 @@ class RerunWriter:
         self._stream.send_recording_name(title)
         self._faces: dict[str, np.ndarray] = {}  # logged last
         self._extent = 0.0
+        self._visual = visual
         self._direction = np.radians([azimuth, elevation])
 
     def close(self) -> None:
@@ -49,21 +53,23 @@ class RerunWriter:
 
     def add(self, step: ReplayedStep) -> None:
         rr, stream = self._rr, self._stream
-        meshes, offsets = meshes_in_the_middle(step), step.layout.vertex_offsets
+        meshes = meshes_in_the_middle(step, self._visual)
+        vertices = np.concatenate([vertices for _, vertices, *_ in meshes])
         if not self._extent:
-            self._look_at(np.concatenate([vertices for _, vertices, *_ in meshes]))
+            self._look_at(vertices)
         stream.set_time("step", sequence=min(step.step, np.iinfo(np.int64).max))  # a publisher may count to 2**64
         stream.set_time("stamp", timestamp=np.datetime64(step.end, "ns"))
-        sizes = np.diff(offsets)
-        faces, edges = (scene_indices([mesh[i] for mesh in meshes], sizes) for i in (2, 3))
-        colours = vertex_colours(sizes, faces, edges, touched(step.contacts, faces, offsets[-1]))
-        colours = (255 * srgb(colours)).astype(np.uint8)
-        for index, (name, vertices, own_faces, own_edges) in enumerate(meshes):
-            own_colours = colours[offsets[index] : offsets[index + 1]]
-            if len(own_faces):
-                self._add_mesh(name, vertices, own_faces, own_colours)
-            if len(own_edges):
-                self._add_edges(name, vertices, own_edges, own_colours)
+        toc = np.concatenate([step.contacts.vf_toc, step.contacts.ee_toc])
+        tint = Tint(np.asarray(step.contacts.points).reshape(-1, 3), toc_colours(toc), vertices)
+        for colour, (name, own_vertices, faces, edges) in zip(
+            mesh_colours([name for name, *_ in meshes]), meshes, strict=True
+        ):
+            own = np.broadcast_to(linear(to_rgb(colour)), own_vertices.shape)
+            colours = (255 * srgb(tint.applied(own_vertices, own))).astype(np.uint8)
+            if len(faces):
+                self._add_mesh(name, own_vertices, faces, colours)
+            if len(edges):
+                self._add_edges(name, own_vertices, edges, colours)
         self._add_contacts(step)
         for name, value in (
             ("contacts", step.total),

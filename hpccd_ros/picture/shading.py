@@ -23,10 +23,11 @@ def vertex_normals(vertices, faces):
     return out / np.maximum(np.linalg.norm(out, axis=1), 1e-30)[:, None]
 
 
-def shade(buffers, camera, vertices, faces, colours, light):
+def shade(buffers, camera, vertices, faces, colours, light, paint):
     """(height, width, 3) linear colours of what `buffers` see, 0 where they see nothing.
 
-    colours: (V,3) linear. light: direction towards the key light.
+    colours: (V,3) linear. light: direction towards the key light. paint: takes the positions (N,3) of pixels, their
+    triangles (N,) and their own colours (N,3); returns their colours before they are lit.
     """
     vertices = vertices.astype(np.float32)
     seen = buffers.triangle >= 0
@@ -50,7 +51,8 @@ def shade(buffers, camera, vertices, faces, colours, light):
     sky = 0.34 + 0.18 * normal[:, 2] + 0.10 * rim
     sun = 0.80 * np.clip(normal @ light, 0, 1) * lit
     energy = (sky * crease)[:, None] * SKY + (sun * (0.45 + 0.55 * crease))[:, None] * SUN
-    base = _interpolate(colours, faces, triangle, weights) * np.where(back, np.float32(0.72), np.float32(1.0))[:, None]
+    base = paint(position, triangle, _interpolate(colours, faces, triangle, weights))
+    base *= np.where(back, np.float32(0.72), np.float32(1.0))[:, None]
     image = np.zeros((*buffers.depth.shape, 3), dtype=np.float32)
     image[seen] = base * energy + (0.10 * gloss * lit)[:, None]
     return image

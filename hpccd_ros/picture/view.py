@@ -9,9 +9,11 @@ from pathlib import Path
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.whole_file import whole_file
+from hpccd_ros.picture.intersecting import IntersectingFaces
 from hpccd_ros.picture.of_recording import History, draw_step
 from hpccd_ros.picture.page.recording_page import write_page
 from hpccd_ros.picture.rerun_recording import RerunWriter, need_rerun
+from hpccd_ros.picture.visual_geometry import VisualGeometry
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
 
@@ -32,6 +34,9 @@ def main(args) -> int:
         setup = recorded_setup.of_recording(recording, args.params)
         replay = Replay(recording, setup, outputs=outputs, distances=False)
         steps = (s for s in replay.steps() if s.contacts is not None)
+        view["visual"] = VisualGeometry(setup.visual())
+        if not in_rerun:
+            view["intersecting"] = IntersectingFaces(setup.builder)
         if in_rerun:
             _show_in_rerun(args, steps, source, title, view)
         elif args.every is None:

@@ -2,6 +2,7 @@
 """The robots of a recording: their descriptions from its attachments or messages, and the mesh files that these
 name."""
 
+import contextlib
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
@@ -30,6 +31,17 @@ def of_recording(recording: Recording, robots: RobotValues, topics: Mapping[str,
             found[name] = _robot(recording, name, values, _descriptions(recording, name, values, topics))
         except (RobotError, MeshFileError) as error:
             raise RecordingError(f"{recording.path}: robot {name}: {error}") from error
+    return found
+
+
+def visual_of_recording(recording: Recording, robots: RobotValues, topics: Mapping[str, str]) -> dict[str, Robot]:
+    """As of_recording(), but made of their visual geometry: of those for whom the description has some and its mesh
+    files are there."""
+    found = {}
+    for name, values in robots.items():
+        with contextlib.suppress(RobotError, MeshFileError):
+            seen = {**values, "geometry": "visual"}
+            found[name] = _robot(recording, name, seen, _descriptions(recording, name, values, topics))
     return found
 
 

@@ -2,7 +2,9 @@
 """The scene of a recording: what the node knew from its parameters and mesh files when it was recorded."""
 
 import dataclasses
+import functools
 import tempfile
+from collections.abc import Callable
 from pathlib import Path, PurePosixPath
 
 from hpccd_core import MeshFileError, load_mesh
@@ -40,6 +42,8 @@ class ReplaySetup:
     robots: dict[str, Robot]
     described_on: list[str]  # topic names of the descriptions that came on one
     unknown: list[str]  # parameters that the node does not have: without effect
+    # The robots, made of their visual geometry. Takes time, and the recording must be open.
+    visual: Callable[[], dict[str, Robot]]
 
     @property
     def builder(self) -> SceneBuilder:
@@ -130,6 +134,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         robots,
         [by_role[role] for role in dict.fromkeys(described)],
         without_effect,
+        functools.partial(recorded_robots.visual_of_recording, recording, of_robots, by_role),
     )
 
 

@@ -38,7 +38,7 @@ _TOOL = _HAND + _FINGERS + FINGER_SIZE[2]
 _FLANGE = 0.08
 
 # Each link: the joint's distance from the one before, its axis, limit, and shapes: kind, sizes, centre's z.
-_LINKS = (
+_LINKS: tuple = (
     (0.15, "z", 2.97, (("cylinder", (0.065, 0.12), 0.08), ("sphere", (0.07,), 0.19))),
     (0.19, "y", 2.09, (("cylinder", (0.06, 0.12), 0.13),)),
     (0.20, "z", 2.97, (("cylinder", (0.055, 0.12), 0.07), ("sphere", (0.06,), 0.20))),
@@ -49,17 +49,21 @@ _LINKS = (
 )
 _BASE = (("box", (0.24, 0.24, 0.03), 0.015), ("cylinder", (0.08, 0.12), 0.09))
 _PALM = (("box", (0.05, 0.12, 0.05), 0.03),)
+# Of the visual geometry alone: a cylinder from each joint to the next one, of this radius, by which the links meet.
+_CORES = (0.065, 0.055, 0.05, 0.045, 0.042, 0.036, 0.034, 0.03)
 
 
 def description(name: str = NAME) -> str:
-    """Its URDF. Collision and visual geometry are the same."""
-    parts = [_link("base", _BASE)]
+    """Its URDF. The visual geometry is that of collisions, and between its shapes no gaps."""
+    distances = [distance for distance, *_ in _LINKS] + [_HAND - _FLANGE]
+    cores = [("cylinder", (radius, length), length / 2) for radius, length in zip(_CORES, distances, strict=True)]
+    parts = [_link("base", _BASE, cores[0])]
     for number, (distance, axis, limit, shapes) in enumerate(_LINKS, 1):
         parent = f"link_{number - 1}" if number > 1 else "base"
         limits = f'<limit lower="{-limit}" upper="{limit}" effort="100" velocity="2"/>'
-        parts.append(_link(f"link_{number}", shapes))
+        parts.append(_link(f"link_{number}", shapes, cores[number]))
         parts.append(_joint(f"joint_{number}", "revolute", parent, f"link_{number}", distance, axis, limits))
-    parts.append(_link("hand", _PALM))
+    parts.append(_link("hand", _PALM, ("box", (0.03, 0.09, _FINGERS), _FINGERS / 2)))
     parts.append(_joint("hand", "fixed", "link_7", "hand", _HAND - _FLANGE))
     for side, sign in (("left", 1), ("right", -1)):
         limits = f'<limit lower="0" upper="{OPEN}" effort="20" velocity="0.2"/>'
@@ -137,10 +141,10 @@ def _about(axis: str, angle: float) -> np.ndarray:
     return turn
 
 
-def _link(name: str, shapes: tuple) -> str:
+def _link(name: str, shapes: tuple, *visual_only: tuple) -> str:
     lines = [f'  <link name="{name}">']
     for use in ("visual", "collision"):
-        for kind, sizes, z, *y in shapes:
+        for kind, sizes, z, *y in (*shapes, *visual_only) if use == "visual" else shapes:
             size = {"box": 'size="{} {} {}"', "cylinder": 'radius="{}" length="{}"', "sphere": 'radius="{}"'}[
                 kind
             ].format(*sizes)

@@ -37,6 +37,7 @@ MIN_SIZE = 1 / 64
 @dataclass(frozen=True)
 class _Entry:
     title: str
+    triangles: int  # at size 1, in frame 0
     frames: int
     make: Callable[..., Scene]  # (name, title, size, frames, seed, progress)
 
@@ -73,28 +74,28 @@ def _armadillo(name, title, size, frames, seed, progress):
 _REGISTRY = {
     "two-triangles": _Entry(
         "a triangle falls through another: one vertex-face contact",
+        2,
         11,
         lambda name, title, size, frames, seed, progress: small.two_triangles(name, title, frames),
     ),
     "folding-strip": _Entry(
-        "a strip folds like a letter and passes through itself, 3 K triangles",
+        "a strip folds like a letter and passes through itself",
+        3_240,
         61,
         lambda name, title, size, frames, seed, progress: small.folding_strip(name, title, size, frames),
     ),
-    "cloth-drop": _Entry("a small cloth falls on a ball that then spins, 7 K triangles", 90, _cloth_drop),
+    "cloth-drop": _Entry("a small cloth falls on a ball that then spins", 7_112, 90, _cloth_drop),
     "arm-and-cloth": _Entry(
-        "an arm takes a cloth between two fingers and drags it across a table, 8 K triangles", 361, _arm_and_cloth
+        "an arm takes a cloth between two fingers and drags it across a table", 8_076, 361, _arm_and_cloth
     ),
-    "cloth-ball-like": _Entry("a cloth drapes on a ball that then spins, 92 K triangles", 94, _cloth_ball),
-    "breaking-like": _Entry(
-        "a boulder shatters a hollow statue: 252 K triangles, changing topology", 60, breaking.make
-    ),
-    "n-body-like-lr": _Entry("60 rigid and deforming bodies fall into a pile, 32 K triangles", 76, _n_body(32_000)),
-    "n-body-like-hr": _Entry("60 rigid and deforming bodies fall into a pile, 146 K triangles", 76, _n_body(146_000)),
+    "cloth-ball-like": _Entry("a cloth drapes on a ball that then spins", 91_888, 94, _cloth_ball),
+    "breaking-like": _Entry("a boulder shatters a hollow statue, whose topology changes", 252_028, 60, breaking.make),
+    "n-body-like-lr": _Entry("60 rigid and deforming bodies fall into a pile", 31_992, 76, _n_body(32_000)),
+    "n-body-like-hr": _Entry("60 rigid and deforming bodies fall into a pile", 146_312, 76, _n_body(146_000)),
     "rod-twist-like": _Entry(
-        "a bundle of rods is twisted until it coils up: layers close together, 106 K triangles", 260, _rod_twist
+        "a bundle of rods is twisted until it coils up: layers close together", 105_984, 260, _rod_twist
     ),
-    "armadillo-like": _Entry("a knobbly body with limbs is drawn between two rollers, 70 K triangles", 260, _armadillo),
+    "armadillo-like": _Entry("a knobbly body with limbs is drawn between two rollers", 70_160, 260, _armadillo),
 }
 
 
@@ -104,8 +105,12 @@ def names() -> list[str]:
 
 
 def describe() -> list[tuple[str, str, int]]:
-    """(name, title, default number of frames) of every scene, without making any."""
-    return [(name, entry.title, entry.frames) for name, entry in _REGISTRY.items()]
+    """(name, title and size, default number of frames) of every scene, without making any."""
+    return [(name, f"{entry.title}, {_size(entry.triangles)}", entry.frames) for name, entry in _REGISTRY.items()]
+
+
+def _size(triangles: int) -> str:
+    return f"{triangles} triangles" if triangles < 1000 else f"{triangles / 1000:.0f} K triangles"
 
 
 def make(name: str, size: float = 1.0, frames: int | None = None, seed: int = 0, progress: bool = False) -> Scene:

@@ -30,6 +30,7 @@ class SceneRobot:
     name          before the links' in names of meshes: NAME/LINK
     description   URDF, its collision geometry of boxes, cylinders and spheres, no frame turned by rpy
     motion        seconds since frame 0 -> values of its joints, radians or metres
+    geometry      of which its meshes are: "collision" or "visual"
 
     Topics: `description` (std_msgs/String, latched), and its joints (sensor_msgs/JointState).
     """
@@ -39,10 +40,11 @@ class SceneRobot:
     motion: Callable[[float], Mapping[str, float]]
     description_topic: str = "robot_description"
     joint_states_topic: str = "joint_states"
+    geometry: str = "collision"
 
     @cached_property
     def robot(self) -> Robot:
-        return Robot.of(self.description, name=self.name)
+        return Robot.of(self.description, geometry=self.geometry, name=self.name)
 
     @cached_property
     def meshes(self) -> tuple[Mesh, ...]:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page in a real browser: it draws, plays and answers to the pointer, complains of nothing and asks for nothing."""
 
+import itertools
+
 import chromium
 import numpy as np
 import pytest
@@ -277,3 +279,64 @@ def test_without_webgl_the_rest_of_it_works(small_bag, tmp_path):
         browser.press("End", 35)
         assert browser.evaluate(STEP) == "89" and "contacts in step 89 of 89" in browser.evaluate(TITLE)
         assert browser.said == ["THREE.WebGLRenderer: Error creating WebGL context."]
+
+
+def test_a_narrow_screen_shows_all_of_it(small_bag, tmp_path):
+    page_of(small_bag, tmp_path / "run.html", title="a recording with a long name, " * 3)
+    with chromium.Chromium(tmp_path / "profile", (480, 900)) as browser:
+        opened(browser, tmp_path / "run.html")
+        boxes = browser.evaluate(
+            "Object.fromEntries(['view', 'help', 'controls', 'slider', 'chart', 'times', 'meshes', 'name'].map((id) => "
+            "[id, (({left, right, top, bottom}) => ({left, right, top, bottom}))"
+            "(document.getElementById(id).getBoundingClientRect())]))"
+        )
+        assert all(0 <= box["left"] and box["right"] <= 480 for box in boxes.values()), boxes
+        assert browser.evaluate("document.documentElement.scrollWidth") <= 480
+        assert boxes["view"]["bottom"] - boxes["view"]["top"] > 350
+        # One below the other: nothing lies over the meshes, and nothing scrolls but the page.
+        order = [boxes[name] for name in ("name", "view", "help", "controls", "chart", "times", "meshes")]
+        assert all(a["bottom"] <= b["top"] for a, b in itertools.pairwise(order)), boxes
+        scrolled = "[...document.querySelectorAll('body *')].filter((e) => e.scrollHeight > e.clientHeight + 1 && "
+        assert browser.evaluate(scrolled + "['auto', 'scroll'].includes(getComputedStyle(e).overflowY)).length") == 0
+        heights = browser.evaluate("[...document.querySelectorAll('#controls button')].map((b) => b.offsetHeight)")
+        assert max(heights) < 1.5 * min(heights), "no label breaks into lines"
+        assert browser.said == []
+
+
+def test_the_tint_surrounds_contacts_and_can_be_switched_off(browser, small_bag, tmp_path):
+    page_of(small_bag, tmp_path / "run.html", shown=lambda number: number == 79)
+    scene = opened(browser, tmp_path / "run.html")
+    browser.evaluate("document.getElementById('show-contacts').click()")
+    tinted = scene.pixels()
+    browser.evaluate("document.getElementById('show-tint').click()")
+    changed = np.abs(scene.pixels() - tinted).max(axis=2) > 12
+    drawn = scene.drawn().sum()
+    assert 0.002 * drawn < changed.sum() < 0.3 * drawn
+    assert browser.said == []
+
+
+def test_one_spike_does_not_rule_the_chart(browser, small_bag, tmp_path):
+    page_of(small_bag, tmp_path / "run.html")
+    opened(browser, tmp_path / "run.html")
+    usual = "usual([...new Array(88).fill(4), 400])"
+    assert 4 < browser.evaluate(usual) < 8
+    assert browser.evaluate("usual([1, 2])") == 2 and browser.evaluate("usual([0])") == 0
+
+
+def test_faces_that_intersect_another_mesh_have_a_colour_of_their_own(browser, hpccd, small_bag, tmp_path):
+    assert hpccd("view", small_bag, "--step", "80", "--html", "run.html").returncode == 0
+    page = Page(tmp_path / "run.html")
+    counts = page.said["steps"][0]["intersecting"]
+    faces = page.integers("intersecting-faces", 4, (1, sum(counts), 1))[0, :, 0]
+    assert counts[0] > 0 and counts[1] > 0
+    assert faces[: counts[0]].max() < len(page.faces(0, 0)) and faces[counts[0] :].max() < len(page.faces(1, 0))
+    scene = opened(browser, tmp_path / "run.html")
+    assert not browser.evaluate("document.getElementById('intersecting').hidden")
+    marked = scene.pixels()
+    browser.evaluate("document.querySelectorAll('#meshes input').forEach((box) => box.click())")
+    browser.evaluate("Recording.prototype.intersectingFaces = () => []")
+    browser.evaluate("document.querySelectorAll('#meshes input').forEach((box) => box.click())")
+    changed = np.abs(scene.pixels() - marked).max(axis=2) > 25
+    assert changed.any()
+    red, green, _ = marked[changed].mean(axis=0)
+    assert green > 1.3 * red

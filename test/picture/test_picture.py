@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pictures show what is there: the nearest surface in each pixel, contacts where they project to."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
+from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.separation import NONE, Separation
-from hpccd_ros.frames.types import NO_EDGES
-from hpccd_ros.picture import contacts
+from hpccd_ros.frames.types import NO_EDGES, MeshSettings, Topology
+from hpccd_ros.picture import contacts, tint
 from hpccd_ros.picture.camera import Camera
+from hpccd_ros.picture.intersecting import IntersectingFaces
 from hpccd_ros.picture.of_recording import separation_fact
 from hpccd_ros.picture.raster import rasterize
 from hpccd_ros.picture.shading import blur, tubes, vertex_normals
@@ -79,12 +83,12 @@ PLANE = ("plane", CORNERS, np.array([[0, 1, 2], [0, 2, 3]]), NO_EDGES)
 
 
 def picture_of(places, toc):
-    """A picture of a plane with contacts at `places`, none of which tints it."""
-    return contacts.Picture([PLANE], np.full(4, np.inf), np.asarray(places, float), np.asarray(toc), "title", ["fact"])
+    """A picture of a plane with contacts at `places`."""
+    return contacts.Picture([PLANE], np.asarray(places, float), np.asarray(toc), "title", ["fact"])
 
 
 def test_the_surface_is_rendered_within_the_range_of_colours():
-    image, _, depth = contacts.render([PLANE], np.full(4, np.inf), (320, 200), -60, 26)
+    image, _, depth = contacts.render([PLANE], (320, 200), -60, 26)
     assert image.shape == (200, 320, 4) and 0 <= image.min() and image.max() <= 1
     seen = image[..., 3] > 0.5
     assert seen.mean() > 0.2 and np.isfinite(depth[::2, ::2][seen]).mean() > 0.98
@@ -101,7 +105,7 @@ def test_edges_are_drawn_as_tubes_around_them():
     assert np.allclose(np.einsum("nx,nx->n", around - points[coloured_as], along), 0, atol=1e-12)
     assert faces.min() == 0 and faces.max() == len(around) - 1
     rope = ("rope", np.array([[-1, 0, 0], [0, 0.5, 0], [1, 0, 0.0]]), np.empty((0, 3), int), np.array([[0, 1], [1, 2]]))
-    image, *_ = contacts.render([rope], np.full(3, np.inf), (320, 200), -60, 26)
+    image, *_ = contacts.render([rope], (320, 200), -60, 26)
     assert 0.002 < (image[..., 3] > 0.5).mean() < 0.1
 
 
@@ -135,6 +139,8 @@ def test_times_of_contact_are_counted_beside_the_scene(count):
     figure = contacts.compose(picture_of(np.zeros((count, 3)), toc), history, size=(320, 200))
     scene, times, curve = figure.axes
     assert sum(bar.get_width() for bar in times.patches) == count
+    assert [text.get_text() for text in times.texts if not count] == ["Nothing touches\nin this step."] * (not count)
+    assert times.axison == (count > 0)
     assert bool(scene.collections) == (count > 0)
     assert curve.lines[0].get_ydata().tolist() == [0, 7, 14, 21, 28] and curve.lines[1].get_xdata()[0] == 3
 
@@ -144,3 +150,100 @@ def test_a_separation_of_many_pairs_takes_no_more_room():
     assert separation_fact(NONE) is None and separation_fact(Separation(0.25)) == "separation 0.25"
     assert separation_fact(Separation(0.0, tuple(pairs[:1]))) == "separation 0, another for 1 pair"
     assert separation_fact(Separation(0.001, tuple(pairs))) == "separation 0.001, another for 1,000 pairs"
+
+
+def grid(cells):
+    """A square of side 2 in the plane z = 0, with about 2 * cells^2 triangles."""
+    x, y = np.meshgrid(np.linspace(-1, 1, cells + 1), np.linspace(-1, 1, cells + 1))
+    vertices = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    first = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).ravel()
+    a, b, c, d = first, first + 1, first + cells + 2, first + cells + 1
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    return ("plane", vertices, faces, NO_EDGES)
+
+
+def test_the_tint_reaches_as_far_whatever_the_size_of_faces():
+    found = []
+    contact = (np.array([[0.3, -0.2, 0.0]]), np.array([0.5]))
+    for cells in (1, 7, 60):
+        plain, camera, _ = contacts.render([grid(cells)], (640, 480), -60, 60)
+        tinted, *_ = contacts.render([grid(cells)], (640, 480), -60, 60, contact)
+        changed = np.abs(tinted - plain).max(axis=2) > 0.02
+        rows, columns = np.nonzero(changed)
+        x, y, _ = camera.project(contact[0])[0]
+        away = np.hypot(columns + 0.5 - x / 2, rows + 0.5 - y / 2)
+        found.append((changed.sum(), away.max()))
+        # Pixels to a unit of length, where the view foreshortens least.
+        scale = np.ptp(camera.project(np.array([[0.3, -0.2, 0], [0.3, -0.2, 0] + camera.right]))[:, 0]) / 2
+        assert 0.4 < away.max() / scale / (2 * tint.RADIUS) < 1.05
+    (most, _), (least, _) = max(found), min(found)
+    assert most - least < 0.05 * most, found
+
+
+def test_only_surfaces_near_a_contact_are_tinted():
+    own = np.full((3, 3), 0.25)
+    places = np.array([[0, 0, 0], [0, 0, 0.9 * 2 * tint.RADIUS], [0, 0, 1.5 * 2 * tint.RADIUS]])
+    painted = tint.Tint(np.zeros((1, 3)), np.array([[1.0, 0, 0]]), CORNERS).applied(places, own)
+    assert painted[0, 0] > painted[1, 0] >= 0.25 and np.array_equal(painted[2], own[2])
+    assert tint.Tint(np.empty((0, 3)), np.empty((0, 3)), CORNERS).applied(places, own) is own
+    # Of a step that is much longer than the scene.
+    far = tint.Tint(np.array([[1e9, 0, 0], [0, 0, 0.0]]), np.ones((2, 3)), CORNERS)
+    assert far.applied(places, own)[0, 0] > 0.25
+
+
+def test_links_of_a_robot_have_one_colour():
+    names = ["table", "arm/base", "arm/hand", "cloth", "other/base", "other/hand"]
+    table, base, hand, cloth, other, _ = contacts.mesh_colours(names)
+    assert base == hand and len({table, base, cloth, other}) == 4
+    assert contacts.mesh_groups(names) == ["table", "arm", "arm", "cloth", "other", "other"]
+
+
+def test_one_warm_up_does_not_rule_the_axis():
+    usual = np.full(90, 4.0)
+    usual[0] = 400.0
+    assert 4.0 < contacts.usual_ceiling(usual) < 10.0
+    assert contacts.usual_ceiling(np.array([1.0, 2.0])) >= 2.0
+    assert contacts.usual_ceiling(np.array([np.nan, 3.0])) >= 3.0
+    ramp = np.linspace(1, 9, 50)
+    assert 9.0 < contacts.usual_ceiling(ramp) < 12.0, "an even rise is shown whole"
+
+
+def test_a_recording_without_contacts_says_so():
+    history = contacts.History(np.arange(5), np.zeros(5, int), np.ones(5), 3)
+    *_, curve = contacts.compose(picture_of(np.zeros((0, 3)), []), history, size=(320, 200)).axes
+    assert [text.get_text() for text in curve.texts] == ["Nothing touches in any of the 5 steps."]
+
+
+TETRAHEDRON = np.array([[0, 0, -0.2], [0.3, 0, -1], [-0.2, 0.3, -1], [-0.2, -0.3, -1.0]])
+SIDES = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]], np.uint32)
+
+
+@pytest.mark.parametrize("ignored", [(), (("plane", "body"),)])
+def test_faces_that_intersect_another_mesh(ignored):
+    _, vertices, faces, _ = grid(8)
+    topologies = (Topology(0, len(vertices), faces.astype(np.uint32)), Topology(0, 4, SIDES))
+    builder = SceneBuilder((MeshSettings("plane"), MeshSettings("body")), ignored)
+    intersecting = IntersectingFaces(builder)
+    for height in (0.0, 0.5):  # below the plane, and with its tip through it
+        plane, body = intersecting.of(topologies, [vertices, TETRAHEDRON + [0.05, 0.02, height]])
+        through = height > 0 and not ignored
+        assert plane.any() == through and not plane.all()
+        assert body.tolist() == [through, through, through, False]
+
+
+def test_they_are_drawn_in_a_colour_of_their_own():
+    body = ("body", TETRAHEDRON + [0.05, 0.02, 0.5], SIDES, NO_EDGES)
+    meshes = [grid(8), body]
+    marked = np.zeros(len(meshes[0][2]) + 4, bool)
+    marked[-4:-1] = True
+    plain, *_ = contacts.render(meshes, (320, 200), -60, 26)
+    image, *_ = contacts.render(meshes, (320, 200), -60, 26, intersecting=marked)
+    changed = np.abs(image - plain).max(axis=2) > 0.05
+    assert 20 < changed.sum() < 0.1 * changed.size
+    red, green, blue = image[changed][:, :3].mean(axis=0)
+    assert green > blue > red
+    picture = contacts.Picture(meshes, np.empty((0, 3)), np.empty(0), "title", [], intersecting=marked)
+    names = ["plane", "body"]
+    for flags, expected in ((marked, [*names, "faces that intersect another mesh"]), (None, names)):
+        (legend,) = contacts.compose(dataclasses.replace(picture, intersecting=flags), size=(320, 200)).legends
+        assert [text.get_text() for text in legend.texts] == expected

@@ -26,6 +26,15 @@ def test_the_papers_scenes_and_small_ones_are_there():
     assert [name for name, _, _ in scenes.describe()] == scenes.names()
 
 
+@pytest.mark.parametrize(("name", "described"), [(name, text) for name, text, _ in scenes.describe()])
+def test_descriptions_tell_the_size_and_titles_do_not(name, described):
+    scene = scenes.make(name, frames=2)
+    title, _, count = described.rpartition(", ")
+    number, *unit = re.fullmatch(r"(\d+)( K)? triangles", count).groups()
+    assert round(scene.n_triangles / (1000 if unit[0] else 1)) == int(number)
+    assert title == scene.title and "triangles" not in scene.title.replace("two triangles", "")
+
+
 @pytest.mark.parametrize("name", TABLE_1)
 def test_triangle_counts_are_those_of_table_1(name):
     scene = scenes.make(name, frames=2)

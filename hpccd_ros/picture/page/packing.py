@@ -3,6 +3,7 @@
 
 import dataclasses
 import zlib
+from collections.abc import Sequence
 
 import numpy as np
 from hpccd.msg import ContactArray
@@ -153,3 +154,19 @@ class ContactColumns:
             "points": packed(grid.rounded(points)[None]),
         }
         return {**grid.described(), "count": len(toc), "times": TIMES}, blobs
+
+
+class FaceLists:
+    """Of each step the faces of each mesh that intersect another mesh, own numbers, one mesh after the other."""
+
+    def __init__(self):
+        self._faces = [np.empty(0, np.uint32)]
+
+    def add(self, marked: Sequence[NDArray[np.bool_]]) -> list[int]:
+        """marked: (F,) of each mesh. How many of each mesh they are."""
+        faces = [np.flatnonzero(of_mesh).astype(np.uint32) for of_mesh in marked]
+        self._faces += faces
+        return [len(of_mesh) for of_mesh in faces]
+
+    def packed(self) -> bytes:
+        return packed(np.concatenate(self._faces).reshape(1, -1, 1))

@@ -11,10 +11,13 @@ from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import shortened
 from hpccd_ros.base.whole_file import whole_file
-from hpccd_ros.picture.contacts import BACKGROUND, FAINT, INK, MESH_COLOURS, TINT, TOC_COLOURS
+from hpccd_ros.picture.contacts import BACKGROUND, FAINT, INK, INTERSECTING, TOC_COLOURS, mesh_colours, mesh_groups
+from hpccd_ros.picture.intersecting import IntersectingFaces
 from hpccd_ros.picture.of_recording import facts
 from hpccd_ros.picture.page.document import document, three
-from hpccd_ros.picture.page.packing import MOST, ContactColumns, MeshPositions
+from hpccd_ros.picture.page.packing import MOST, ContactColumns, FaceLists, MeshPositions
+from hpccd_ros.picture.tint import RADIUS, STRENGTH
+from hpccd_ros.picture.visual_geometry import NO_VISUAL, VisualGeometry
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay, ReplayedStep
 from hpccd_ros.scenes.progress import track
@@ -30,9 +33,24 @@ TOC_SHADES = 33
 class RecordingPage:
     """Collects steps, computed with outputs=("points",). every: each N-th step is shown."""
 
-    def __init__(self, replay: Replay, mesh_names, title: str, *, every=1, azimuth=-60.0, elevation=26.0):
+    def __init__(
+        self,
+        replay: Replay,
+        mesh_names,
+        title: str,
+        *,
+        every=1,
+        azimuth=-60.0,
+        elevation=26.0,
+        visual: VisualGeometry = NO_VISUAL,
+        intersecting: IntersectingFaces | None = None,
+    ):
         self._replay = replay
-        self._meshes = [MeshPositions(name) for name in mesh_names]
+        self._names, self._visual = list(mesh_names), visual
+        self._meshes = [MeshPositions(name) for name in self._names]
+        # Drawn in place of links; behind the meshes of the scene, whose numbers contacts have.
+        self._seen = {name: MeshPositions(name) for name in visual.topologies}
+        self._intersecting, self._marked = intersecting, FaceLists()
         self._contacts = ContactColumns()
         self._title, self._every = title, every
         self._view = {"azimuth": azimuth, "elevation": elevation}
@@ -57,6 +75,9 @@ class RecordingPage:
         if not shown:
             return
         self._add_positions(step)
+        marked = [np.empty(0, bool)] * len(self._meshes)
+        if self._intersecting is not None and step.end_frame is not None:
+            marked = self._intersecting.of(step.end_frame.topologies, step.end_frame.vertices)
         drawn = (0, 0) if step.contacts is None else self._contacts.add(step.contacts, step.layout)
         self._steps.append(
             {
@@ -64,6 +85,7 @@ class RecordingPage:
                 "time": self._time(step),
                 "total": None if step.contacts is None else step.total,
                 "drawn": drawn,
+                "intersecting": self._marked.add(marked),
                 "milliseconds": None if step.contacts is None else step.milliseconds,
                 "facts": [] if step.contacts is None else [shortened(fact, 100) for fact in facts(step)],
                 "notices": [shortened(notice, 400) for notice in self._notices(step, sum(drawn))],
@@ -78,7 +100,13 @@ class RecordingPage:
                 mesh.add_nothing()
             else:
                 mesh.add(frame.topologies[number], frame.vertices[number])
-        if sum(mesh.bytes for mesh in self._meshes) > MOST_POSITIONS:
+        found = {} if frame is None else self._visual.vertices(self._names, frame)
+        for name, mesh in self._seen.items():
+            if name in found:
+                mesh.add(self._visual.topologies[name], found[name])
+            else:
+                mesh.add_nothing()
+        if sum(mesh.bytes for mesh in (*self._meshes, *self._seen.values())) > MOST_POSITIONS:
             raise UserError(
                 f"the positions of {self.steps} steps fill the {MOST_POSITIONS >> 20} MB that a page may hold; "
                 f"show fewer of them: --every {2 * self._every}"
@@ -114,13 +142,22 @@ class RecordingPage:
     def described(self) -> tuple[dict, dict[str, bytes]]:
         """(what the page says, as JSON can hold it, {name: bytes} of what it draws)."""
         meshes, blobs = [], {}
-        for number, mesh in enumerate(self._meshes):
+        drawn = [*self._meshes, *self._seen.values()]
+        names = [mesh.name for mesh in drawn]
+        colours, groups = mesh_colours(names), mesh_groups(names)
+        for number, mesh in enumerate(drawn):
             description, of_mesh = mesh.described()
-            meshes.append({**description, "colour": MESH_COLOURS[number % len(MESH_COLOURS)]})
+            colour, group = colours[number], groups[number]
+            collision = number < len(self._meshes)
+            if mesh.name in self._seen:
+                group += ": collision geometry" if collision else ""
+            hidden = collision and mesh.name in self._seen
+            meshes.append({**description, "colour": colour, "group": group, "hidden": hidden})
             blobs |= {f"mesh-{number}-{name}": data for name, data in of_mesh.items()}
         gaps = _gaps(self._numbers)
         contacts, columns = self._contacts.described()
         blobs |= {f"contacts-{name}": data for name, data in columns.items()}
+        blobs["intersecting-faces"] = self._marked.packed()
         description = {
             "title": shortened(self._title),
             "view": self._view,
@@ -128,7 +165,9 @@ class RecordingPage:
                 "background": BACKGROUND,
                 "ink": INK,
                 "faint": FAINT,
-                "tint": TINT,
+                "tint": STRENGTH,
+                "radius": RADIUS,
+                "intersecting": INTERSECTING,
                 "toc": [[float(c) for c in TOC_COLOURS(t)[:3]] for t in np.linspace(0.0, 1.0, TOC_SHADES)],
             },
             "meshes": meshes,
@@ -210,6 +249,8 @@ def _page_of(args, source, title, view, every) -> RecordingPage:
     with Recording(source) as recording:
         setup = recorded_setup.of_recording(recording, args.params)
         replay = Replay(recording, setup, outputs=("points",), distances=False)
+        visual = VisualGeometry(setup.visual())
+        view |= {"visual": visual, "intersecting": IntersectingFaces(setup.builder)}
         page = RecordingPage(replay, setup.mesh_names, title, every=every, **view)
         for number, step in enumerate(track(replay.steps(), "steps", True, replay.recorded_answers or None)):
             page.add(step, step.step == args.step if args.step is not None else number % every == 0)

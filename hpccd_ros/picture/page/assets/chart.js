@@ -14,7 +14,7 @@ class Chart {
     Object.assign(this, { canvas, recording, step: 0, hovered: null });
     const { steps } = recording;
     this.mostContacts = ceiling(steps.map((step) => step.total ?? 0));
-    this.mostMilliseconds = ceiling(steps.map((step) => step.milliseconds ?? 0));
+    this.mostMilliseconds = ceiling([usual(steps.map((step) => step.milliseconds ?? 0))]);
     const choose = (event) => chosen(this.stepAt(event.offsetX));
     canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); choose(event); });
     canvas.addEventListener("pointermove", (event) => {
@@ -61,14 +61,22 @@ class Chart {
     let pen = "moveTo";
     steps.forEach((step, i) => {
       if (step.milliseconds === null) { pen = "moveTo"; return; }
-      const y = floor - (step.milliseconds / this.mostMilliseconds) * tall;
+      const y = floor - Math.min(step.milliseconds / this.mostMilliseconds, 1) * tall;
       if (pen === "moveTo") context.moveTo(x(i + 0.5) - 1, y);
       context.lineTo(x(i + 0.5), y);
       pen = "lineTo";
     });
     context.stroke();
+    context.fillStyle = Chart.MILLISECONDS;
+    steps.forEach((step, i) => { // beyond the axis
+      if (step.milliseconds > this.mostMilliseconds) triangle(context, x(i + 0.5), Chart.TOP);
+    });
 
     context.fillStyle = colours.faint;
+    if (!steps.some((step) => step.total)) {
+      context.textAlign = "center";
+      context.fillText("Nothing touches in any step.", width / 2, Chart.TOP + tall / 2);
+    }
     context.fillRect(Chart.LEFT, floor, width - Chart.LEFT - Chart.RIGHT, 1);
     context.textAlign = "center";
     const every = ceiling([70 / wide], [1, 2, 5, 10]), counted = steps.every((step, i) => Number(step.step) - Number(steps[0].step) === i);
@@ -100,6 +108,21 @@ function axis(context, colour, name, align, x, most, top, floor) {
   context.fillText(most.toLocaleString("en"), x, top + 12);
   context.fillText((most / 2).toLocaleString("en"), x, (top + floor) / 2 + 5);
   context.fillText("0", x, floor);
+}
+
+function triangle(context, x, y) {
+  context.beginPath();
+  context.moveTo(x - 4, y + 6);
+  context.lineTo(x + 4, y + 6);
+  context.lineTo(x, y);
+  context.fill();
+}
+
+// What the axis has to hold: the largest 5 % of the values, such as those of a warm-up, do not rule it.
+function usual(values) {
+  const sorted = [...values].sort((a, b) => a - b), most = sorted.at(-1);
+  const common = sorted[Math.max(0, sorted.length - 1 - Math.max(1, Math.floor(sorted.length / 20)))];
+  return most < 2.5 * common || !common ? most : 1.3 * common;
 }
 
 // A round number that is not less than any of `values`: one of `digits` times a power of ten.

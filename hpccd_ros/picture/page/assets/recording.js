@@ -12,7 +12,11 @@ class Recording {
     this.centre = low.map((value, axis) => (boxes.length ? 0.5 * value + 0.5 * high[axis] : 0));
     this.scale = (boxes.length && Math.max(...low.map((value, axis) => 0.5 * high[axis] - 0.5 * value))) || 1;
     this.firstContact = [0];
-    for (const step of this.steps) this.firstContact.push(this.firstContact.at(-1) + step.drawn[0] + step.drawn[1]);
+    this.firstIntersecting = [0];
+    for (const step of this.steps) {
+      this.firstContact.push(this.firstContact.at(-1) + step.drawn[0] + step.drawn[1]);
+      this.firstIntersecting.push(step.intersecting.reduce((sum, count) => sum + count, this.firstIntersecting.at(-1)));
+    }
   }
 
   async unpack() {
@@ -24,6 +28,7 @@ class Recording {
         topology.positions = await unpack(`mesh-${number}-positions-${t}`, 2, frames, vertices, 3);
       }
     }
+    this.intersecting = await unpack("intersecting-faces", 4, 1, this.firstIntersecting.at(-1), 1);
     const { contacts } = this;
     contacts.meshes = await unpack("contacts-meshes", 4, 1, contacts.count, 2);
     contacts.features = await unpack("contacts-features", 4, 1, contacts.count, 4);
@@ -43,6 +48,13 @@ class Recording {
   shown(mesh, step) {
     const shown = this.meshes[mesh].shown[step];
     return shown && { topology: this.meshes[mesh].topologies[shown[0]], number: shown[0], frame: shown[1] };
+  }
+
+  // Numbers of the faces of a mesh that intersect another mesh at the end of a step.
+  intersectingFaces(mesh, step) {
+    const counts = this.steps[step].intersecting;
+    const first = counts.slice(0, mesh).reduce((sum, count) => sum + count, this.firstIntersecting[step]);
+    return this.intersecting.subarray(first, first + (counts[mesh] ?? 0));
   }
 
   // Contact `index` of all: {vf, meshes, features, toc, point}.

@@ -17,12 +17,19 @@ class Times {
       const toc = recording.contacts.toc[i] / recording.contacts.times;
       counts[Math.min(Times.BINS - 1, Math.floor(toc * Times.BINS))] += 1;
     }
+    if (!counts.some(Boolean)) {
+      context.font = "13px system-ui, sans-serif";
+      context.fillStyle = recording.colours.faint;
+      const known = recording.steps[step].total !== null;
+      context.fillText(known ? "Nothing touches in this step." : "No contacts are known.", 0, 20);
+      return;
+    }
     const most = Math.max(...counts, 1), left = 12, right = width - 52, top = 6, bottom = height - 18;
     const tall = (bottom - top) / Times.BINS;
     counts.forEach((count, bin) => {
       const colour = recording.tocColour((bin + 0.5) / Times.BINS).map((c) => Math.round(255 * c));
       context.fillStyle = `rgb(${colour})`;
-      context.fillRect(0, bottom - (bin + 1) * tall, 7, tall + 0.5); // the scale, also where nothing touches
+      context.fillRect(0, bottom - (bin + 1) * tall, 7, tall + 0.5); // the scale
       context.fillRect(left, bottom - (bin + 1) * tall, (count / most) * (right - left), Math.max(tall - 1, 0.5));
     });
     context.font = "11px system-ui, sans-serif";

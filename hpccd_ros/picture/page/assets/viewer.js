@@ -133,6 +133,7 @@ class Viewer {
     this.chart = new Chart(byId("chart"), recording, (step) => this.choose(step));
     this.times = new Times(byId("times"), recording);
     this.listMeshes();
+    byId("intersecting").firstElementChild.style.background = recording.colours.intersecting;
     this.writeNotes();
     this.bindControls();
     this.worst = recording.steps.reduce((best, step, i, all) => ((step.total ?? -1) > (all[best].total ?? -1) ? i : best), 0);
@@ -169,6 +170,7 @@ class Viewer {
     byId("place").textContent = `${step + 1} of ${steps.length}${time === null ? "" : `, ${time.toFixed(3)} s`}`;
     for (const id of ["first", "back"]) byId(id).disabled = step === 0;
     for (const id of ["forward", "last"]) byId(id).disabled = step === steps.length - 1;
+    byId("intersecting").hidden = !steps[step].intersecting.some(Boolean);
     this.forget();
     this.stage?.show(step);
     this.chart.show(step);
@@ -250,17 +252,24 @@ class Viewer {
     });
   }
 
+  // An entry for each mesh, and for all links of a robot together.
   listMeshes() {
-    byId("meshes").replaceChildren(...this.recording.meshes.map((mesh, number) => {
+    const { meshes, steps } = this.recording, groups = new Map();
+    meshes.forEach((mesh, number) => groups.set(mesh.group, [...(groups.get(mesh.group) ?? []), number]));
+    byId("meshes").replaceChildren(...[...groups].map(([group, numbers]) => {
       const label = document.createElement("label"), box = document.createElement("input");
-      Object.assign(box, { type: "checkbox", checked: true });
+      const first = meshes[numbers[0]];
+      Object.assign(box, { type: "checkbox", checked: !first.hidden });
       box.addEventListener("change", () => {
-        if (this.stage) this.stage.surfaces.visible[number] = box.checked;
+        for (const number of numbers) if (this.stage) this.stage.surfaces.visible[number] = box.checked;
         this.redraw();
       });
       const swatch = element("span", "", "swatch");
-      swatch.style.background = mesh.colour;
-      label.append(box, swatch, element("span", mesh.name, "of"), element("small", sizeOf(mesh, this.recording.steps.length)));
+      swatch.style.background = first.colour;
+      const triangles = numbers.reduce((sum, number) => sum + (meshes[number].topologies.at(-1)?.faces ?? 0), 0);
+      const size = numbers.length === 1 ? sizeOf(first, steps.length)
+        : `${numbers.length} links, ${triangles.toLocaleString("en")} triangles`;
+      label.append(box, swatch, element("span", group, "of"), element("small", size));
       const entry = document.createElement("li");
       entry.append(label);
       return entry;
