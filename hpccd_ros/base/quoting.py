@@ -39,10 +39,16 @@ def repeated(names: Iterable[str]) -> str:
     return quoted(Counter(names).most_common(1)[0][0])
 
 
-def suggestion(word: str, names: Iterable[str], similarity: float = 0.6) -> str:
-    """ "; did you mean NAME?" with the name nearest to ``word``; "": none has this similarity (difflib, 0 .. 1)."""
+def nearest(word: str, names: Iterable[str], similarity: float = 0.6) -> str:
+    """The name nearest to ``word``; "": none has this similarity (difflib, 0 .. 1)."""
     near = len(word) <= LONGEST and difflib.get_close_matches(word, list(names), n=1, cutoff=similarity)
-    return f"; did you mean {near[0]}?" if near else ""
+    return near[0] if near else ""
+
+
+def suggestion(word: str, names: Iterable[str], similarity: float = 0.6) -> str:
+    """ "; did you mean NAME?" with the `nearest` name; "": there is none."""
+    near = nearest(word, names, similarity)
+    return f"; did you mean {near}?" if near else ""
 
 
 def not_one_of(value: object, choices: Sequence[str]) -> str:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import os
 import tokenize
 import zipfile
@@ -17,6 +16,7 @@ import numpy as np
 
 import hpccd_core as hc
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import suggestion
 from hpccd_ros.scenes.scene import Mesh
 
 # Table 1 of Kim et al. 2009, in its order: generated scenes of the same size and character.
@@ -152,10 +152,10 @@ def _one(word, data, size):
     if data and (data / f"{word}.npz").is_file():
         return of_npz(data / f"{word}.npz")
     files = [path.stem for path in data_files(data)]
-    near = difflib.get_close_matches(word, [*scenes.names(), *files], n=1)
+    near = suggestion(word, [*scenes.names(), *files])
     raise UserError(
         f"{word}: neither a file, nor a generated scene ({', '.join(scenes.names())}), nor a data file "
-        f"({', '.join(files) or 'none (HPCCD_DATA is not set)'}){f'; did you mean {near[0]}?' if near else ''}"
+        f"({', '.join(files) or 'none (HPCCD_DATA is not set)'}){near}"
     )
 
 

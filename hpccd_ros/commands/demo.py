@@ -14,10 +14,9 @@ before; one that fails or is interrupted leaves them as they are.
 Uses a DDS domain of its own unless ROS_DOMAIN_ID is set. Ctrl-C ends all processes.
 """
 
-import difflib
-
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.feature_list import feature_list
+from hpccd_ros.base.quoting import nearest
 from hpccd_ros.params.table import ACCURACIES, NODE_ROWS
 
 MOST_THREADS = next(row.span[1] for row in NODE_ROWS if row.name == "threads")
@@ -56,8 +55,8 @@ def run(args) -> int:
     if not 0 <= args.threads <= MOST_THREADS:
         raise UserError(f"--threads {args.threads}: must be from 0 to {MOST_THREADS}")
     if args.accuracy is not None and args.accuracy not in ACCURACIES:
-        near = difflib.get_close_matches(args.accuracy, ACCURACIES, n=1)
-        remedy = f"did you mean {near[0]}?" if near else f"use one of {', '.join(ACCURACIES)}"
+        near = nearest(args.accuracy, ACCURACIES)
+        remedy = f"did you mean {near}?" if near else f"use one of {', '.join(ACCURACIES)}"
         raise UserError(f"--accuracy {args.accuracy}: not a tier; {remedy}")
     if args.small:
         args.size, args.compression = 0.15, "zstd"

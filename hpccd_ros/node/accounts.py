@@ -137,7 +137,7 @@ class RefusalLog:
         self._log(mesh, mesh, reason, shortened(text, _LONGEST))
 
     def together(self, refusals: Iterable[Refusal]) -> None:
-        """Those that have a text. Of what several links of a robot were refused for, the text of the first is told."""
+        """Those that have a text. One text stands for all links of a robot that were refused for the same reason."""
         alike: dict[tuple[str, Reason], list[Refusal]] = {}
         for refusal in refusals:
             if refusal.text and (robot := _robot(refusal)):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """From the topics of the meshes to detections: connects subscriptions, pipeline and detection thread."""
 
+import itertools
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -29,6 +30,9 @@ from hpccd_ros.node.stop_watch import StopWatch
 from hpccd_ros.params import robot_parameters, scene_parameters
 from hpccd_ros.params.table import ROBOT
 from hpccd_ros.robots.joint_frames import JointFrames
+
+# Inputs without messages that are reported at a time.
+_MOST_SILENT = 10
 
 
 class StreamDetection:
@@ -220,8 +224,9 @@ class Subscriptions:
         return [line for part in (*self._of_meshes, *self._of_others) for line in part.warnings()]
 
     def silent(self) -> list[str]:
-        """Which messages have stopped, or have not begun, to come."""
-        return [line for part in (*self._of_meshes, *self._of_others) for line in part.silent()]
+        """Which messages have stopped, or have not begun, to come; the first few, as each costs a look at the graph."""
+        parts = (*self._of_meshes, *self._of_others)
+        return list(itertools.islice((line for part in parts for line in part.silent()), _MOST_SILENT))
 
 
 def _load_files(pipeline: FramePipeline, meshes: dict[str, dict[str, Any]]) -> Outcome:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Notice frames of meshes that the node does not have: usually a misspelt name, which nothing else would report."""
 
-import difflib
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,7 +15,7 @@ from sensor_msgs.msg import PointCloud2
 from shape_msgs.msg import Mesh
 from visualization_msgs.msg import Marker
 
-from hpccd_ros.base.quoting import counted, listed
+from hpccd_ros.base.quoting import counted, listed, nearest
 from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.middleware import graph, message_types, qos, topic_names
 from hpccd_ros.node.accounts import Accounts
@@ -41,7 +40,7 @@ class UnknownMeshWatch:
 
     A mesh is another node's where one with a service of type hpccd/srv/Detect subscribes to its topology: so do
     detectors to their meshes. Recorders, which subscribe to anything, have no such service; nodes like this one, which
-    watch the vertices as strangers, leave the topology alone.
+    subscribe to the vertices only to count them, leave the topology alone.
     A topic is taken up when it is found a second time, since a node that starts is discovered piece by piece, and let
     go when its publishers have left or another node has taken it over.
     Where parameter count_unknown_meshes is set, they are subscribed to raw (without deserialising) and each frame is
@@ -87,8 +86,9 @@ class UnknownMeshWatch:
 
     def _meant(self, topic: str) -> str:
         mesh, _, kind = topic.removeprefix(self._prefix).rpartition("/")
-        meant = [f"{self._prefix}{known}/{kind}" for known in difflib.get_close_matches(mesh, self._known, n=1)]
-        return f"; did you mean {meant[0]}?" if meant else "; add its mesh there, or correct the name"
+        near = nearest(mesh, self._known)
+        meant = f"did you mean {self._prefix}{near}/{kind}?" if near else "add its mesh there, or correct the name"
+        return f"; {meant}"
 
     def _check(self) -> None:
         unknown = self._unknown()

@@ -5,11 +5,10 @@ A misspelt `stop_distance` would start a node without the topic stop. A paramete
 section /**, gives each node the parameters of all.
 """
 
-import difflib
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from hpccd_ros.base.quoting import counted, listed, shortened, suggestion
+from hpccd_ros.base.quoting import counted, listed, nearest, shortened, suggestion
 from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS, PAIRS, ROBOT, ROBOT_ROWS, STOP_ROWS, Row
 from hpccd_ros.params.values import ParameterError
 
@@ -22,7 +21,7 @@ _NAMES = [row.name for row in NODE_ROWS]
 # Whatever begins so is taken for a parameter of the topic stop.
 _STOP = "stop"
 # From this similarity on (difflib, 0 .. 1) a name is taken for a misspelt one of ours: 0.92 for stop_distanse and
-# stop_distance, 0.67 for update_rate and max_rate.
+# stop_distance, 0.63 for update_rate and max_rate.
 _NEAR = 0.8
 # Problems that are reported at once.
 _MOST = 3
@@ -62,8 +61,8 @@ def _problem(name: str, settings: dict[str, Any]) -> str:
     if first == _QOS:
         return ""
     if dot:
-        near = difflib.get_close_matches(first.lower(), _FIRST_PARTS, n=1, cutoff=_NEAR)
-        return f"{shown}: no such parameter; did you mean {shortened(f'{near[0]}.{rest}')}?" if near else ""
+        near = nearest(first.lower(), _FIRST_PARTS, _NEAR)
+        return f"{shown}: no such parameter; did you mean {shortened(f'{near}.{rest}')}?" if near else ""
     if near := suggestion(first.lower(), _NAMES, _NEAR):
         return f"{shown}: no such parameter; {_FOREIGN}{near}"
     if first.lower().startswith(_STOP):
@@ -80,8 +79,8 @@ def _in_section(first: str, rest: str, settings: dict[str, Any]) -> str:
     if not key:
         return f"no parameter; write {first}.NAME.KEY, with a KEY out of {', '.join(keys)}"
     if owner not in names:
-        near = difflib.get_close_matches(owner, names, n=1)
-        meant = f"; did you mean {first}.{near[0]}.{shortened(key)}?" if near else ""
+        near = nearest(owner, names)
+        meant = f"; did you mean {first}.{near}.{shortened(key)}?" if near else ""
         return (
             f"{shortened(owner)} is not in the parameter {parameter} ({listed(names) or 'which is empty'}); add it "
             f"there, or leave out {first}.{shortened(owner)}.*{meant}"

@@ -35,3 +35,21 @@ def test_the_name_that_is_there_twice():
 
 def test_nothing_reaches_the_terminal_that_it_obeys():
     assert quoting.printable("\x1b[2J\r\n\u202e") == r"\x1b[2J\r\n\u202e"
+
+
+def test_counts_agree_with_their_nouns():
+    assert [quoting.counted(n, "frame") for n in (0, 1, 2, 1234)] == ["0 frames", "1 frame", "2 frames", "1,234 frames"]
+    assert quoting.counted(2, "vertex", "vertices") == "2 vertices" and quoting.counted(1, "vertex", "x") == "1 vertex"
+
+
+def test_the_nearest_name():
+    assert quoting.suggestion("acuracy", ["accuracy", "backend"]) == "; did you mean accuracy?"
+    assert quoting.suggestion("gravity", ["accuracy", "backend"]) == quoting.suggestion("a", []) == ""
+    assert quoting.nearest("update_rate", ["max_rate"], 0.8) == "" and quoting.nearest("update_rate", ["max_rate"])
+    assert quoting.nearest(10**6 * "x", ["x"]) == "", "nobody types so much"
+
+
+def test_what_is_not_one_of_the_allowed_names_them():
+    text = quoting.not_one_of("exakt", ("fast", "exact"))
+    assert text == "'exakt' is not valid; use one of fast, exact; did you mean exact?"
+    assert quoting.not_one_of(5, ("fast", "exact")) == "5 is not valid; use one of fast, exact"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Each cause is in the log once, until it has been gone for a while; what it is told of lasts."""
+"""Each cause is in the log once, until it has been gone for a while."""
 
 import pytest
 
