@@ -38,7 +38,7 @@ copybutton_exclude = ".linenos, .gp, .go"
 # Python: numpydoc sections, and types by their short names.
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
-autodoc_default_options = {"members": True, "show-inheritance": False}
+autodoc_default_options = {"members": True}
 numpydoc_show_class_members = False
 # Without a network the site is built as well: nothing of other sites is fetched.
 intersphinx_mapping = {}

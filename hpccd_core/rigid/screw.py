@@ -132,7 +132,7 @@ class Screw:
         return rounding.up(chord * factor + slack)
 
     def chord(self, body: Body) -> float:
-        """The greatest |c'| of its vertices, up to the rounding that `deviation` adds."""
+        """The greatest ``|c'|`` of its vertices, up to the rounding that `deviation` adds."""
         if not self.half:
             return 0.0
         # c' = A v + b. The projection is taken of the matrix: one pass over the vertices.

@@ -9,6 +9,7 @@ import re
 import pytest
 from sources import PAGES, ROOT
 
+import hpccd_core as hc
 from hpccd_ros import cli
 from hpccd_ros.commands.bench import BENCHMARKS
 
@@ -102,6 +103,11 @@ def options(command):
             if isinstance(action, argparse._SubParsersAction):
                 parsers += action.choices.values()
     return found
+
+
+def test_reference_has_every_public_name():
+    page = (ROOT / "docs" / "api" / "python.md").read_text()
+    assert [name for name in hc.__all__ if f"hpccd_core.{name}\n" not in page] == ["__version__"]
 
 
 @each_page
