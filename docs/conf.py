@@ -51,9 +51,17 @@ hawkmoth_clang = ["-std=c++20", f"-I{hawkmoth_root}", *compiler.get_include_args
 def setup(app):
     app.connect("builder-inited", lambda app: generate.everything(HERE / "generated", Path(hawkmoth_root)))
     app.connect("source-read", _repository_links)
+    app.connect("autodoc-process-docstring", _module_examples)
 
 
 def _repository_links(app, page, source):
     folder = (HERE / page).parent
     if folder.name != "generated":
         source[0] = generate.site_links(source[0], folder, folder)
+
+
+def _module_examples(app, what, name, obj, options, lines):
+    """numpydoc leaves the sections of modules as they are, and several on a page would share an anchor."""
+    if what == "module" and "Examples" in lines:
+        start = lines.index("Examples")
+        lines[start : start + 2] = [".. rubric:: Examples", ""]
