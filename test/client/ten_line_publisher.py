@@ -16,5 +16,5 @@ topology.publish(client.topology_message(np.array([[0, 1, 2], [3, 4, 5]]), n_ver
 x = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, 0.5], [1.2, 0.2, 0.5], [0.2, 1.2, 0.5]], np.float32)
 for step in range(100):
     x[3:, 2] = 0.5 * np.cos(0.3 * step)  # the second triangle goes up and down through the first
-    vertices.publish(client.vertices_message(x, node.get_clock().now().nanoseconds, step=step))
+    vertices.publish(client.vertices_message(x, node.get_clock().now(), step=step))
     time.sleep(0.05)
