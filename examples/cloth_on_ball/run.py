@@ -2,26 +2,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """A square cloth falls on a spinning ball, and never touches it or itself.
 
-A simulator that asks hpccd three questions: what comes near on the way (constraints of the solver), how much of a
-solved move is free (no move is made beyond that), and, to check, whether anything intersects. The physics is in the
-package cloth_solver beside this file; docs/simulators.md explains how it works.
+A simulator with three queries to hpccd: pairs that come near during a step (constraints of the solver), the
+collision-free part of a solved move (the step size), and, as a check, intersections. The physics is in the package
+cloth_solver beside this file; docs/simulators.md explains it.
 
   python examples/cloth_on_ball/run.py
                         in this process; a minute or two, with a picture in cloth_on_ball.png
   python examples/cloth_on_ball/run.py --cells 40 --frames 100
-                        coarse, a few seconds
+                        a coarse mesh, a few seconds
   python examples/cloth_on_ball/run.py --mcap cloth.mcap
-                        the frames too, for `hpccd replay`, `hpccd view`, `ros2 bag play` or Foxglove
+                        also a recording of the frames, for `hpccd replay` and `hpccd view`
   python examples/cloth_on_ball/run.py --node --mcap cloth.mcap
-                        the same questions to an hpccd node over DDS, which is started for this. Each frame is streamed
-                        to it too, and it records frames and answers: `hpccd replay cloth.mcap` verifies them
+                        the same queries to an hpccd node over DDS, started by this program. It also receives each
+                        frame, and records frames and results: `hpccd replay cloth.mcap` verifies them
   python examples/cloth_on_ball/run.py --params cloth.yaml
   hpccd_node --ros-args --params-file cloth.yaml &
   python examples/cloth_on_ball/run.py --node hpccd
-                        a node that you have started yourself
+                        a node that is already running
 
-Exit status: 0 where nothing intersected and momentum and energy are accounted for, 1 where not or where the cloth is
-stuck, 2 for wrong use.
+Exit status: 0 if nothing intersected and momentum and energy are accounted for, 1 if not or if the cloth is stuck, 2
+for wrong arguments.
 """
 
 import argparse
@@ -63,41 +63,43 @@ def _arguments(argv):
         type=int,
         default=240,
         metavar="N",
-        help="the start and N - 1 moves, each of 10 ms unless it is shortened (default: %(default)s)",
+        help="the start and N - 1 moves of at most 10 ms each (default: %(default)s)",
     )
     parser.add_argument(
         "--cells",
         type=int,
         default=100,
         metavar="N",
-        help="along a side of the cloth, 2 N^2 triangles (default: %(default)s)",
+        help="cells along a side of the cloth, 2 N^2 triangles (default: %(default)s)",
     )
     parser.add_argument(
         "--spin",
         type=float,
         default=Setup.spin,
         metavar="RAD/S",
-        help="of the ball (default: %(default)s); at 12 some moves are solved again and again",
+        help="spin of the ball (default: %(default)s); at 12 some moves are solved repeatedly",
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the cloth's unevenness (default: 0)")
-    parser.add_argument("--threads", type=int, default=0, metavar="N", help="of the detector; 0: all cores (default)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the cloth's unevenness (default: 0)")
+    parser.add_argument(
+        "--threads", type=int, default=0, metavar="N", help="threads of the detector; 0: all cores (default)"
+    )
     parser.add_argument(
         "--node",
         nargs="?",
         const="",
         metavar="NAME",
-        help="ask a node over DDS: the one with this name, or, without a name, one started for this",
+        help="use a node over DDS: the one with this name or, without a name, a new one",
     )
     parser.add_argument(
         "--picture",
         type=Path,
         default=Path("cloth_on_ball.png"),
         metavar="FILE",
-        help="six frames (default: %(default)s); an empty name for none",
+        help="picture of six frames (default: %(default)s); an empty name for none",
     )
     parser.add_argument("--mcap", type=Path, metavar="FILE", help="recording; must not exist yet")
     parser.add_argument("--npz", type=Path, metavar="FILE", help="all frames as numpy arrays; must not exist yet")
-    parser.add_argument("--params", type=Path, metavar="FILE", help="write the parameters of a node for this, and end")
+    parser.add_argument("--params", type=Path, metavar="FILE", help="write parameters for a node, and end")
     args = parser.parse_args(argv)
     for name, least, most in (
         ("frames", 2, 100_000),

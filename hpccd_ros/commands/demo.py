@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""See it work, in about half a minute: starts the node, a publisher that streams a moving scene, and a recorder,
-as separate processes over DDS; shows the contacts as they come; verifies the recording; draws its worst frame.
-No frame is dropped: each waits for the answer to the one before, so that a slow machine plays the scene slower.
+"""Start the node, a publisher of a moving scene and a recorder as processes over DDS, for about half a minute; show the
+contacts as they arrive, verify the recording, and draw the frame with the most contacts.
+No frame is dropped: each waits for the result of the one before, so a slow machine plays the scene slower.
 
-  hpccd demo                                a small cloth falls on a ball that then spins
+  hpccd demo                                a small cloth falls on a ball, which then rotates
   hpccd demo --scene n-body-like-lr --rate 10
   hpccd demo --scene cloth-ball-like --rate 5 --out big
   hpccd demo --scene arm-and-cloth --rate 60   an arm drags a cloth across a table
@@ -33,18 +33,25 @@ def configure(parser):
         "--size", type=float, default=1.0, metavar="X", help="factor on the number of triangles (default: %(default)s)"
     )
     parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: the scene's own)")
-    parser.add_argument("--rate", type=float, default=15.0, metavar="HZ", help="frames a second (default: %(default)s)")
-    parser.add_argument("--accuracy", metavar="TIER", help="of the node (default: the node's own)")
+    parser.add_argument(
+        "--rate", type=float, default=15.0, metavar="HZ", help="frames per second (default: %(default)s)"
+    )
+    parser.add_argument("--accuracy", metavar="TIER", help="accuracy of the node (default: the node's own)")
     parser.add_argument(
         "--features",
         default=(),
         type=feature_list,
         metavar="KIND[,KIND]",
-        help="what the node tests: vertex_face, edge_edge or both (default: the node's own)",
+        help="features that the node tests: vertex_face, edge_edge or both (default: the node's own)",
     )
-    parser.add_argument("--threads", type=int, default=0, metavar="N", help="of the node; 0: all cores (default)")
     parser.add_argument(
-        "--compression", choices=("none", "lz4", "zstd"), default="none", help="of the recording (default: %(default)s)"
+        "--threads", type=int, default=0, metavar="N", help="threads of the node; 0: all cores (default)"
+    )
+    parser.add_argument(
+        "--compression",
+        choices=("none", "lz4", "zstd"),
+        default="none",
+        help="compression of the recording (default: %(default)s)",
     )
     parser.add_argument("--small", action="store_true", help="a coarse mesh, compressed")
 

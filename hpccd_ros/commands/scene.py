@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Generate a deforming scene and play it over DDS, write it to a file, or draw it.
+"""Generate a deforming scene and publish it over DDS, write it to a file, or draw it.
 
   hpccd scene --list
   hpccd scene cloth-drop --publish --rate 30 --loop
-                        stream meshes/cloth/... and meshes/ball/... as a simulation would
+                        publish meshes/cloth/... and meshes/ball/... like a simulation
   hpccd scene arm-and-cloth --publish --rate 60
-                        a robot beside cloth: joint_states and robot_description, too
+                        a robot beside a cloth: also joint_states and robot_description
   hpccd scene cloth-drop --params drop.yaml
-                        then: hpccd_node --ros-args --params-file drop.yaml
+                        parameters for hpccd_node --ros-args --params-file drop.yaml
   hpccd scene n-body-like-lr --mcap bodies.mcap
-                        for `hpccd replay`, `ros2 bag play` or Foxglove
+                        a recording, in rosbag2's MCAP layout
   hpccd scene cloth-ball-like --size 0.25 --npz cloth.npz
   hpccd scene breaking-like --png break.png --at 0,12,20,40
 
-Scenes are the same on every run for the same name, size, frames and seed. Those with a simulated motion take
-seconds the first time; it is then kept in the cache folder ($XDG_CACHE_HOME or ~/.cache, hpccd/scenes).
+The same name, size, frames and seed give the same scene, bit for bit. A simulated motion takes seconds the first time
+and is then stored in the cache folder ($XDG_CACHE_HOME or ~/.cache, hpccd/scenes).
 """
 
 from hpccd_ros.base.errors import UserError
@@ -22,7 +22,7 @@ from hpccd_ros.base.quoting import counted
 
 
 def configure(parser):
-    parser.add_argument("name", nargs="?", metavar="NAME", help="which scene, see --list")
+    parser.add_argument("name", nargs="?", metavar="NAME", help="name of the scene, see --list")
     parser.add_argument("--list", action="store_true", help="names and titles of all scenes")
     parser.add_argument(
         "--size",
@@ -32,36 +32,41 @@ def configure(parser):
         help="factor on the number of triangles, same motion (default: %(default)s)",
     )
     parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: the scene's own)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of random numbers (default: %(default)s)")
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="seed of random numbers (default: %(default)s)"
+    )
     parser.add_argument(
         "--rate",
         type=float,
         default=30.0,
         metavar="HZ",
-        help="frames a second, for --publish and --mcap (default: %(default)s)",
+        help="frames per second, for --publish and --mcap (default: %(default)s)",
     )
     play = parser.add_argument_group("play over DDS")
-    play.add_argument("--publish", action="store_true", help="publish meshes, of a robot its joint states")
-    play.add_argument("--loop", action="store_true", help="over and over, until Ctrl-C")
+    play.add_argument("--publish", action="store_true", help="publish meshes, and the joint states of a robot")
+    play.add_argument("--loop", action="store_true", help="repeat until Ctrl-C")
     play.add_argument(
         "--wait",
         type=float,
         default=10.0,
         metavar="S",
-        help="how long to wait for a subscriber before the first frame (default: %(default)s)",
+        help="seconds to wait for subscribers before the first frame (default: %(default)s)",
     )
     play.add_argument(
         "--subscribers",
         type=int,
         default=1,
         metavar="N",
-        help="how many to wait for: 2 for a node and a recorder (default: %(default)s)",
+        help="number to wait for; 2 for a node and a recorder (default: %(default)s)",
     )
-    play.add_argument("--ros-args", nargs="...", default=[], help="remappings and the like, as for any ROS program")
+    play.add_argument("--ros-args", nargs="...", default=[], help="ROS arguments, such as remappings")
     files = parser.add_argument_group("write a file (existing files are not overwritten, but for pictures)")
     files.add_argument("--mcap", metavar="FILE", help="recording of all frames")
     files.add_argument(
-        "--compression", choices=("none", "lz4", "zstd"), default="none", help="of --mcap (default: %(default)s)"
+        "--compression",
+        choices=("none", "lz4", "zstd"),
+        default="none",
+        help="compression of --mcap (default: %(default)s)",
     )
     files.add_argument("--npz", metavar="FILE", help="all frames as numpy arrays")
     files.add_argument(
@@ -70,7 +75,7 @@ def configure(parser):
         metavar="K",
         help="with --npz: only the step from frame K-1 to K (vertices_t0, vertices_t1, faces)",
     )
-    files.add_argument("--params", metavar="FILE", help="parameters for a node that listens to this scene")
+    files.add_argument("--params", metavar="FILE", help="parameters for a node that receives this scene")
     files.add_argument("--png", metavar="FILE", help="picture of some frames")
     files.add_argument("--at", metavar="K,K,...", help="frames of --png (default: six over the whole scene)")
 

@@ -249,13 +249,13 @@ def _last_words(folder, console, worst):
     console.print(
         f"""
 [bold green]done[/]       worst frame: step {worst.step}, {worst.total:,} contacts
-           recording  {recording}  ({recording.stat().st_size / 1e6:.1f} MB; Foxglove and `ros2 bag play` open it)
+           recording  {recording}  ({recording.stat().st_size / 1e6:.1f} MB, in rosbag2's MCAP layout)
            picture    {picture}
 
 try next
-  {command} replay {replayed}            compute it again, compare every contact
+  {command} replay {replayed}            recompute it, compare every contact
   {command} view {replayed} --step {worst.step}    draw a frame of your choice
-  {command} scene --list                          more scenes: {command} demo --scene n-body-like-lr
+  {command} scene --list                          other scenes: {command} demo --scene n-body-like-lr
   {command} --help                                all commands""",
         markup=True,
         soft_wrap=True,
