@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The demo: start the processes, show how it goes, verify the recording, draw its worst frame."""
+"""The demo: start the processes, show the progress, verify the recording, draw the frame with the most contacts."""
 
 import contextlib
 import os
@@ -24,12 +24,12 @@ from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
 from hpccd_ros.scenes import files
 
-# What a run leaves behind, and the next one replaces once it has succeeded.
+# Results of a run; the next successful run replaces them.
 RECORDING, PICTURE, PARAMETERS = RESULTS = ("demo.mcap", "demo.png", "node.yaml")
 LOGS = ("node.log", "recorder.log", "publisher.log")
 # Kept where the contacts of the recording are not those that it is verified with.
 DIVERGED = "demo-diverged.mcap"
-# s for the last answers to reach the disk; reached where the recorder has lost some.
+# s for the last results to reach the disk; only reached if the recorder has lost some.
 WRITTEN = 30.0
 
 
@@ -149,7 +149,7 @@ def _stream(args, scene, folder, recording, parameters, console):
 
 
 def _steps(scene) -> int:
-    """Steps that a node answers: the first frame, and the first with another topology, only begins one."""
+    """Number of steps with a result: the first frame, and the first with another topology, only begins one."""
     if scene.make_faces is None:
         return scene.n_frames - 1
     return sum(1 for frame in scene.frames() if frame.index and not frame.topologies)
@@ -177,7 +177,7 @@ def _recorded_answers(path) -> int:
 
 
 def _watch(monitor, children, publisher, steps, console):
-    """Show the answers as they come, until the publisher has ended and the last answer is there."""
+    """Show the results as they arrive, until the publisher has ended and the last result has arrived."""
     progress = Progress(
         TextColumn("          "),
         BarColumn(bar_width=28),
@@ -263,7 +263,7 @@ try next
 
 
 def hpccd_from_here() -> str:
-    """How the user's shell, in its folder, runs the hpccd that runs now."""
+    """The command that runs this hpccd from the user's shell and folder."""
     beside = Path(sys.executable).parent
     search = os.environ.get("PATH", "").split(os.pathsep)
     if "MAKELEVEL" in os.environ and search[:1] == [str(beside)]:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The answer to a step on its topics: contacts; on request smallest distances, each pair of meshes in brief, and what
-viewers show of them."""
+"""Publishes the results of a step: contacts; on request smallest distances, summaries of pairs of meshes, and messages
+for viewers."""
 
 import time
 from typing import Any
@@ -20,7 +20,7 @@ from hpccd_ros.node.markers import contact_markers, surface_cloud
 
 
 class ContactsPublisher:
-    """Of a configured ``node``, until that is unconfigured."""
+    """Publishers of a configured ``node``, until it is unconfigured."""
 
     def __init__(self, node: GuardedLifecycleNode, settings: dict[str, Any]) -> None:
         self._settings = settings
@@ -84,7 +84,7 @@ class ContactsPublisher:
         self._pairs.publish(PairSummaryArray(header=header, step=found.end.step, pairs=pairs))
 
     def show(self, found: Detection, header: Header) -> None:
-        """For viewers, where parameter markers is set: no more often than they want it."""
+        """Publish for viewers, if parameter markers is set, at the requested rate at most."""
         now = time.monotonic()
         # A step that was under way when markers were asked for has none of what they show.
         shown = self._settings["markers"] and {"points", "normals"} <= set(found.options.outputs)

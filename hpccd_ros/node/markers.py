@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What RViz and Foxglove show: contacts as markers, thinned out so that viewers keep up, and vertices."""
+"""Messages for RViz and Foxglove: contacts as markers, limited in number so that viewers keep up, and vertices."""
 
 from collections.abc import Sequence
 
@@ -31,8 +31,8 @@ def contact_markers(
     size: float,
     limit: int,
 ) -> MarkerArray:
-    """Always four markers, so that old ones disappear: vertex-face, edge-edge (points), normals, and between the sides
-    of pairs that are near (lines).
+    """Always four markers, so that old ones disappear: vertex-face, edge-edge (points), normals, and connections of
+    near pairs (lines).
 
     points, normals: (N,3), the first ``n_vertex_face`` of vertex-face contacts. closest: (N,2,3) nearest points of both
     sides, or (0,2,3) where nothing is to stay apart. limit: most contacts drawn, taken evenly from the whole list.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Counts and times of the node, as they are measured. No ROS."""
+"""Counts and times that the node measures. No ROS."""
 
 import threading
 from collections import deque
@@ -34,7 +34,7 @@ class Metrics:
         self._stages: dict[str, deque[float]] = {}
 
     def frame_received(self, mesh: str, transport_ms: float | None, messages: int = 1) -> None:
-        """Vertex messages came. transport_ms: since the publisher wrote one, None where unknown."""
+        """Vertex messages arrived. transport_ms: since the publisher wrote one, None if unknown."""
         with self._lock:
             self.received[mesh] = self.received.get(mesh, 0) + messages
             if transport_ms is not None:
@@ -79,7 +79,7 @@ class Metrics:
             self.last = {key: str(value) for key, value in last.items()}
 
     def failed(self, text: str) -> None:
-        """One step could not be answered (its messages are counted as dropped)."""
+        """One step failed (its messages are counted as dropped)."""
         with self._lock:
             self.failures += 1
             self.last_failure = text

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The node: life cycle and wiring."""
+"""The node: its life cycle, and the connections between its parts."""
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
@@ -32,11 +32,11 @@ SUCCESS = TransitionCallbackReturn.SUCCESS
 
 
 class HpccdNode(GuardedLifecycleNode):
-    """Streams of vertices in, contacts out. To be run by a GuardedExecutor.
+    """Vertices in, contacts out. A GuardedExecutor runs it.
 
-    Configured: parameters checked, mesh files read, publishers, service and action there. Active: subscribed and
-    detecting, from when all robots are known.
-    Raises ParameterError for parameters that it cannot start with.
+    Configured: parameters are checked, mesh files read; publishers, service and action exist. Active: subscribed and
+    detecting, once all robots are known.
+    Raises ParameterError for invalid parameters.
     """
 
     def __init__(self) -> None:
@@ -90,7 +90,7 @@ class HpccdNode(GuardedLifecycleNode):
         return SUCCESS
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """No longer subscribed; frames that still waited are counted as dropped, and goals that are open end."""
+        """Unsubscribe; count waiting frames as dropped, and end open goals."""
         self._stop()
         if self._action is not None:
             self._action.stop()
@@ -108,7 +108,7 @@ class HpccdNode(GuardedLifecycleNode):
         return SUCCESS
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """After a transition that raised: back to unconfigured, with nothing left of what it may have made."""
+        """After a transition that raised: back to unconfigured, without anything that it created."""
         return self.on_shutdown(state)
 
     def close(self) -> None:
@@ -119,7 +119,7 @@ class HpccdNode(GuardedLifecycleNode):
         self._end_requests()
 
     def _make_scene(self) -> None:
-        """Of the robots that are known. Raises ValueError, and then the scene before stays."""
+        """Make the scene of the known robots. Raises ValueError, and keeps the previous scene then."""
         self._builder = self._configuration.with_robots(self._robots.robots)
         self._deforming = [mesh.name for mesh in self._builder.meshes if not mesh.static]
         if self._stream is not None:
@@ -128,7 +128,7 @@ class HpccdNode(GuardedLifecycleNode):
             self._stream = StreamDetection(self, self._configuration, self._builder, self._accounts)
 
     def _follow_robots(self) -> None:
-        """The scene is that of the descriptions that have come."""
+        """Make the scene of the received descriptions."""
         try:
             self._make_scene()
         except ValueError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The node's own recording (parameter `record`): what goes in and comes out, in files as those of `hpccd record`."""
+"""The node's own recording (parameter `record`): inputs and results, in files like those of `hpccd record`."""
 
 import dataclasses
 import functools
@@ -24,7 +24,7 @@ from hpccd_ros.record import attachments, recorded_topics
 from hpccd_ros.record.recorded_topics import missing_shapes, recording_info
 from hpccd_ros.record.topic_recorder import DescribedRobots, Recorder
 
-# Messages of a topic that may wait for the disk before they are lost (and counted): bounds the memory.
+# Queue of each topic; further messages are lost and counted. Bounds the memory.
 DEPTH = 50
 # Made for a recording; more is a mistake, and Python's own way to make them fails at a thousand.
 MOST_NEW_FOLDERS = 100
@@ -33,10 +33,10 @@ NUMBER = "_1000000.mcap.part"
 
 
 class NodeRecording:
-    """Starts and ends recordings of `node` as its parameter `record` says; never stops the node for an error.
+    """Starts and ends recordings of `node` according to its parameter `record`; an error never stops the node.
 
-    It listens through raw subscriptions in a node and a thread of its own, so that the disk delays neither messages
-    nor detection, and the files hold the bytes as they were sent.
+    It has raw subscriptions in its own node and thread, so the disk delays neither messages nor detection, and the
+    files contain the bytes as they were sent.
     """
 
     def __init__(self, node: Node, settings: dict[str, Any], errors: Errors) -> None:
@@ -73,7 +73,7 @@ class NodeRecording:
             self._running = None
 
     def status(self) -> tuple[bytes, str, dict[str, object]] | None:
-        """(level, message, values) for the diagnostics, or None where nothing was ever to be recorded."""
+        """(level, message, values) for the diagnostics, or None if nothing was ever recorded."""
         if self._failure:
             return DiagnosticStatus.ERROR, self._failure, {}
         return self._last.status(self._running is not None) if self._last is not None else None
@@ -118,7 +118,7 @@ def _no_place(target: Path) -> str | None:
 
 
 class _Running:
-    """One recording, from construction until `end`. Raises OSError, ValueError where it cannot begin."""
+    """One recording, from construction until `end`. Raises OSError or ValueError if it cannot begin."""
 
     def __init__(self, node: Node, settings: dict[str, Any], errors: Errors) -> None:
         parameters = node_parameters.of(node)
