@@ -161,7 +161,8 @@ def _paint(vertices, faces, contacts, intersecting):
     def paint(position, triangle, own):
         painted = tint.applied(position, own)
         if marked.any():
-            painted[marked[np.minimum(triangle, len(marked) - 1)]] = linear(to_rgb(INTERSECTING))
+            of_marked = marked[np.minimum(triangle, len(marked) - 1)]
+            painted[of_marked] = 0.3 * painted[of_marked] + 0.7 * linear(to_rgb(INTERSECTING))
         return painted
 
     return paint

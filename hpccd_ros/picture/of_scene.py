@@ -49,7 +49,7 @@ def save(
             f"{scene.name}, frame {index}: {sum(map(len, scene.faces(index))):,} triangles", color=INK, fontsize=10
         )
         if marked.any():
-            what = "green: faces that intersect another mesh"
+            what = "bright green: faces that intersect another mesh"
             axes.text(0.5, -0.01, what, transform=axes.transAxes, ha="center", va="top", color=INTERSECTING, fontsize=8)
     figure.tight_layout()
     with whole_file(path, overwrite=True) as draft:

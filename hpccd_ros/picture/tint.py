@@ -8,7 +8,7 @@ import numpy as np
 # faces.
 RADIUS = 0.025
 # Of the grid to the radius; and the largest share of the tint in a colour.
-CELLS = 4
+CELLS = 5
 STRENGTH = 0.6
 
 
@@ -27,16 +27,20 @@ class Tint:
         self._cell = radius / CELLS
         self._low = places.min(axis=0) - CELLS * self._cell
         self._shape = np.ceil(np.ptp(places, axis=0) / self._cell).astype(int) + 2 * CELLS + 2
-        cells = np.ravel_multi_index(tuple(np.rint((places - self._low) / self._cell).astype(int).T), self._shape)
-        values = np.column_stack([colours, np.ones(len(places))])
-        grid = np.stack([np.bincount(cells, v, minlength=int(np.prod(self._shape))) for v in values.T], axis=-1)
-        grid = _blurred(grid.reshape(*self._shape, 4).astype(np.float32))
+        # Of no offset, as an index behind the first cell.
+        centre = np.ravel_multi_index((CELLS, CELLS, CELLS), self._shape)
+        at = np.rint((places - self._low) / self._cell).astype(int)
+        cells, number = np.unique(np.ravel_multi_index(tuple(at.T), self._shape), return_inverse=True)
+        values = np.stack([np.bincount(number, v) for v in (*colours.T, np.ones(len(places)))], axis=1)
+        grid = np.zeros((int(np.prod(self._shape)), 4), np.float32)
+        for offset, part in _kernel():
+            grid[cells + np.ravel_multi_index(tuple(CELLS + offset), self._shape) - centre] += part * values
         # A single contact has weight 0.8 where it is; many have nearly 1.
-        density = grid[..., 3]
-        weight = 1.0 - np.exp(-1.6 * density / _PEAK)
-        grid[..., :3] *= (weight / np.maximum(density, np.float32(1e-9)))[..., None]
-        grid[..., 3] = weight
-        self._grid = grid.reshape(-1, 4)
+        density = grid[:, 3]
+        weight = 1.0 - np.exp(-1.6 * density)
+        grid[:, :3] *= (weight / np.maximum(density, np.float32(1e-9)))[:, None]
+        grid[:, 3] = weight
+        self._grid = grid
 
     def applied(self, places: np.ndarray, own: np.ndarray) -> np.ndarray:
         """The colours `own` (N,3), linear RGB, of surfaces at `places` (N,3), tinted."""
@@ -56,19 +60,10 @@ class Tint:
         return tinted
 
 
-def _blurred(grid: np.ndarray) -> np.ndarray:
-    """Two box filters of three cells along each axis: smooth, and 0 beyond two cells. A place is up to one cell from
-    those that it is interpolated from, and a contact up to 0.87 from the middle of its cell: less than `CELLS`."""
-    for axis in range(3):
-        for _ in range(2):
-            spread = grid.copy()
-            lower, upper = [slice(None)] * 4, [slice(None)] * 4
-            lower[axis], upper[axis] = slice(None, -1), slice(1, None)
-            spread[tuple(upper)] += grid[tuple(lower)]
-            spread[tuple(lower)] += grid[tuple(upper)]
-            grid = spread / np.float32(3.0)
-    return grid
-
-
-# What the filters leave of a single 1 where it was.
-_PEAK = (1 / 3) ** 3
+def _kernel():
+    """(offset (3,), part) of the cells around a contact. A place is up to one cell from those that it is interpolated
+    from, and a contact up to 0.87 from the middle of its cell: with both, nothing is tinted beyond the radius."""
+    reach = CELLS - 1.87
+    offsets = np.array(list(np.ndindex(*3 * (2 * CELLS + 1,)))) - CELLS
+    away = np.linalg.norm(offsets, axis=1) / reach
+    return [(offset, np.float32((1 - far**2) ** 2)) for offset, far in zip(offsets, away, strict=True) if far < 1]

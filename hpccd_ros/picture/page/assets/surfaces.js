@@ -17,11 +17,12 @@ class Surfaces {
     this.tint = new Tint(recording);
     this.tint.paint(this.material);
     this.marks = this.material.clone(); // without the offset: in front of the surface
-    this.marks.setValues({ vertexColors: false, color: recording.colours.intersecting, polygonOffset: false });
+    this.marks.setValues({ vertexColors: false, color: recording.colours.intersecting, polygonOffset: false, transparent: true, opacity: 0.55 });
     this.edges = new THREE.MeshBasicMaterial({ color: 0x0a0d13, wireframe: true, transparent: true, opacity: 0.35 });
     this.points = new THREE.PointsMaterial({ vertexColors: true, size: 3 * devicePixelRatio, sizeAttenuation: false });
     this.lines = new THREE.LineBasicMaterial({ vertexColors: true });
     this.withEdges = false;
+    this.withMarks = true;
   }
 
   show(step, tint) {
@@ -40,7 +41,7 @@ class Surfaces {
       this.group.add(drawn.object);
       if (drawn.lines) this.group.add(drawn.lines);
       const marked = recording.intersectingFaces(mesh, step);
-      if (marked.length) this.group.add(this.mark(drawn, shown.topology, marked));
+      if (marked.length && this.withMarks) this.group.add(this.mark(drawn, shown.topology, marked));
       if (this.withEdges && shown.topology.faces) this.group.add(drawn.edges);
     }
   }

@@ -133,7 +133,7 @@ class Viewer {
     this.chart = new Chart(byId("chart"), recording, (step) => this.choose(step));
     this.times = new Times(byId("times"), recording);
     this.listMeshes();
-    byId("intersecting").firstElementChild.style.background = recording.colours.intersecting;
+    document.querySelector("#intersecting .swatch").style.background = recording.colours.intersecting;
     this.writeNotes();
     this.bindControls();
     this.worst = recording.steps.reduce((best, step, i, all) => ((step.total ?? -1) > (all[best].total ?? -1) ? i : best), 0);
@@ -233,6 +233,10 @@ class Viewer {
     });
     byId("show-tint").addEventListener("change", (event) => {
       if (this.stage) this.stage.tint = event.target.checked;
+      this.redraw();
+    });
+    byId("show-intersecting").addEventListener("change", (event) => {
+      if (this.stage) this.stage.surfaces.withMarks = event.target.checked;
       this.redraw();
     });
     byId("show-edges").addEventListener("change", (event) => {
