@@ -38,9 +38,9 @@ class JointStateWatch:
         else:
             self._names = names
 
-    def silent(self) -> bool:
-        """Whether no message has come for a while."""
-        return self._silence.lasts(self._received)
+    def silent(self, publishers: int) -> bool:
+        """Whether no message has come for a while from so many publishers."""
+        return self._silence.lasts((self._received, publishers))
 
     def warnings(self) -> list[str]:
         """Each with its remedy."""

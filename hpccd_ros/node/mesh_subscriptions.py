@@ -101,7 +101,8 @@ class MeshTopic:
 
     def silent(self) -> list[str]:
         """Why nothing comes, where that has lasted."""
-        if self._subscription is None or not self._silence.lasts(self.received):
+        # A publisher has its time from when it is found on.
+        if self._subscription is None or not self._silence.lasts((self.received, self.publishers)):
             return []
         why = self._subscription.why_silent(mesh_inputs.TYPE_NAMES[self.kind])
         return [why] if why else []

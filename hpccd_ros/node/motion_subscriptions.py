@@ -91,7 +91,7 @@ class JointSubscriptions:
         return [
             why
             for topic, subscription in zip(self._watches, self._subscriptions, strict=True)
-            if subscription.publishers and self._watches[topic].silent()
+            if (count := subscription.publishers) and self._watches[topic].silent(count)
             if (why := subscription.why_silent(message_types.JOINT_STATES))
         ]
 

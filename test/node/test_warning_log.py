@@ -64,6 +64,7 @@ def test_numbers_make_no_new_cause_but_names_do(log):
 
 def test_silence(clock):
     silence = Silence(clock)
+    assert not silence.lasts(0)
     clock.now += 2.9
     assert not silence.lasts(0)
     clock.now += 0.1
@@ -102,9 +103,17 @@ def test_a_stamp_that_does_not_advance(watch, clock, stamp, says):
 
 def test_a_stream_that_ends_is_no_stamp_that_stays(watch, clock):
     watch.receive(5, ["elbow"])
-    assert not watch.silent()
+    assert not watch.silent(1)
     clock.now += 60.0
-    assert watch.warnings() == [] and watch.silent()
+    assert watch.warnings() == [] and watch.silent(1)
+
+
+def test_a_new_publisher_has_its_time(watch, clock):
+    assert not watch.silent(1)
+    clock.now += 60.0
+    assert not watch.silent(2) and not watch.silent(2)
+    clock.now += 3.0
+    assert watch.silent(2)
 
 
 def test_a_clock_that_is_set_back_advances_from_there(watch, clock):
