@@ -10,9 +10,17 @@ from hpccd_core.rigid import rounding
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """``vertices`` (n,3) float64 in the body's own frame. ``radius``: not below the farthest from its origin.
+    """A mesh that keeps its shape, and bounds on its size.
 
-    ``centre`` (3,), ``girth``: a ball that holds them all.
+    Attributes
+    ----------
+    vertices : ndarray, shape (n, 3), float64
+        Positions in the frame of the body.
+    radius : float
+        Upper bound on the distance of a vertex from the origin of that frame.
+    centre : ndarray, shape (3,), float64
+    girth : float
+        Radius of a ball around `centre` that holds all vertices.
     """
 
     vertices: np.ndarray
@@ -22,7 +30,18 @@ class Body:
 
     @classmethod
     def of(cls, vertices: np.ndarray) -> "Body":
-        """Of (n,3) float32 or float64, finite; n may be 0."""
+        """The body with these vertices.
+
+        Parameters
+        ----------
+        vertices : ndarray, shape (n, 3), float32 or float64
+            Positions in the frame of the body; n may be 0.
+
+        Raises
+        ------
+        ValueError
+            If the shape is wrong or a coordinate is not finite.
+        """
         exact = np.array(vertices, np.float64)
         if exact.ndim != 2 or exact.shape[1] != 3:
             raise ValueError(f"vertices: expected (n,3), got {exact.shape}")

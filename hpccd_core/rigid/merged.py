@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The answers about the parts of a step as one answer about the step."""
+"""The contacts of the parts of a step as those of the step."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,12 +11,27 @@ from hpccd_core.parts import contacts_of_step, hash_of
 
 
 def merged(found: Sequence[hc.Contacts], parts: int, whole: hc.Contacts | None = None) -> hc.Contacts:
-    """Each pair once, from the earliest part in which it is reported: its toc as a time of the step, point, normal and
-    nearest points. Order and hash as the core's.
+    """The contacts of the parts of a step as those of the step: each pair once, from the earliest part that has it.
 
-    found: of the first parts in their order, each of one world; fewer than ``parts`` where a detector that reports
-    "first" or "any" found some: give no later ones then. whole: of the whole step, about pairs of meshes that were not
-    cut, in the same numbering and with the same outputs.
+    Parameters
+    ----------
+    found : sequence of Contacts
+        Contacts of the parts in their order, of one world each. After a part in which a detector with report="first"
+        or "any" found contacts, leave out the later parts.
+    parts : int
+        Number of parts of the step.
+    whole : Contacts, optional
+        Contacts of the whole step between meshes that were not cut, in the same numbering, with the same outputs.
+
+    Returns
+    -------
+    Contacts
+        Times are those of the step; order and hash as those of a detector.
+
+    Raises
+    ------
+    ValueError
+        If there are more results than parts or none, or results of many worlds.
     """
     if not 1 <= len(found) <= parts:
         raise ValueError(f"found: answers of {len(found)} parts, the step has {parts}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the vertices of one mesh go through a step: what cuts and margins need of it, whatever moves it."""
+"""Motions of the vertices of one mesh through a step, as cuts and margins use them."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,21 +13,27 @@ from hpccd_core.rigid.screw import Screw
 
 
 class Motion(Protocol):
-    """Of one mesh, in one step that is cut into ``parts`` equal ones."""
+    """The motion of one mesh in a step that is divided into ``parts`` equal ones."""
 
     def vertices(self, cut: int, parts: int) -> np.ndarray:
         """(n,3) at the end of this number of parts: 0 is the start of the step. Not to be written to."""
 
     def deviation(self, parts: int) -> float:
-        """Not below how far the straight lines between exact cuts are from the motion, at the same time."""
+        """Upper bound on the distance of the straight lines between exact positions from the motion, at any time."""
 
     def rounding(self, parts: int) -> float:
-        """Not below how far a vertex at a cut is from where it should be."""
+        """Upper bound on the error of a computed position at the ends of the parts."""
 
 
 @dataclass(frozen=True, eq=False)
 class ScrewMotion:
-    """A rigid mesh between two poses."""
+    """A rigid mesh that follows a screw between two poses.
+
+    Attributes
+    ----------
+    body : Body
+    screw : Screw
+    """
 
     body: Body
     screw: Screw
@@ -52,8 +58,13 @@ class ScrewMotion:
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """A mesh whose vertices go straight from ``start`` to ``end``, (n,3) each: it deforms, or rests (the same
-    array)."""
+    """A mesh whose vertices move on straight lines: it deforms, or rests (the same array twice).
+
+    Attributes
+    ----------
+    start, end : ndarray, shape (n, 3)
+        Positions at both ends of the step.
+    """
 
     start: np.ndarray
     end: np.ndarray

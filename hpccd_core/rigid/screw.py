@@ -56,7 +56,16 @@ _NO_TURN = 1e-140
 
 @dataclass(frozen=True, eq=False)
 class Screw:
-    """``axis`` (3,): a unit vector, zeros where nothing turns. ``half``: half the angle, in radians, 0 to pi/2."""
+    """The motion between two poses: rotation about a fixed axis and translation along it, at constant speed.
+
+    Attributes
+    ----------
+    start, end : Rigid
+    axis : ndarray, shape (3,), float64
+        Unit vector; zeros without rotation.
+    half : float
+        Half of the angle in radians, 0 to pi/2.
+    """
 
     start: Rigid
     end: Rigid
@@ -65,7 +74,7 @@ class Screw:
 
     @classmethod
     def between(cls, start: Rigid, end: Rigid) -> "Screw":
-        """The one of at most half a turn."""
+        """The screw of at most half a turn from `start` to `end`."""
         turn = product(end.quaternion, start.quaternion * [-1, -1, -1, 1])
         x, y, z, w = turn.tolist()
         if w < 0 or (w == 0 and next((component for component in (x, y, z) if component), 1.0) < 0):
@@ -77,6 +86,7 @@ class Screw:
 
     @property
     def angle(self) -> float:
+        """The angle of the rotation, in radians."""
         return 2.0 * self.half
 
     @property

@@ -22,14 +22,34 @@ _LENGTH_TOLERANCE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Rigid:
-    """x -> R x + shift. ``quaternion`` (4,) float64 x y z w of length 1, ``shift`` (3,) float64."""
+    """A rigid transform: rotation, then translation. x -> R x + shift.
+
+    Attributes
+    ----------
+    quaternion : ndarray, shape (4,), float64
+        Unit quaternion x y z w of the rotation.
+    shift : ndarray, shape (3,), float64
+        Translation, in the unit of the coordinates.
+    """
 
     quaternion: NDArray[np.float64]
     shift: NDArray[np.float64]
 
     @classmethod
     def of(cls, shift: Sequence[float], quaternion: Sequence[float]) -> "Rigid":
-        """Checked. Raises ValueError: not 3 and 4 numbers, not finite, quaternion not of length 1 within 1e-3."""
+        """The transform of a translation and a quaternion, which are checked.
+
+        Parameters
+        ----------
+        shift : sequence of 3 float
+        quaternion : sequence of 4 float
+            x y z w, of length 1 within 1e-3; it is normalised.
+
+        Raises
+        ------
+        ValueError
+            If there are not 3 and 4 finite numbers, or the quaternion has another length.
+        """
         way, turn = np.array(shift, np.float64), np.array(quaternion, np.float64)
         if way.shape != (3,) or turn.shape != (4,) or not np.isfinite([*way, *turn]).all():
             raise ValueError("needs 7 finite numbers: x y z, quaternion x y z w")
@@ -39,21 +59,22 @@ class Rigid:
         return cls(turn / length, way)
 
     def apply(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n,3) float64. Without a rotation, coordinates are only shifted; without a shift, returned as they are."""
+        """Transformed vertices, (n, 3) float64. The identity returns the array itself."""
         if not self.quaternion[:3].any():
             return vertices + self.shift if self.shift.any() else vertices
         return rotated(self.rotation(), vertices) + self.shift
 
     def after(self, first: "Rigid") -> "Rigid":
-        """``first``, then this one."""
+        """The transform that applies `first`, then this one."""
         return Rigid(product(self.quaternion, first.quaternion), rotated(self.rotation(), first.shift) + self.shift)
 
     def inverse(self) -> "Rigid":
+        """The transform that undoes this one."""
         back = Rigid(self.quaternion * [-1, -1, -1, 1], np.zeros(3))
         return Rigid(back.quaternion, -rotated(back.rotation(), self.shift))
 
     def between(self, other: "Rigid", t: float) -> "Rigid":
-        """At t in [0, 1] on the way to ``other``: shifts linearly, rotation at constant speed the shorter way."""
+        """The transform at t in [0, 1] between this one and `other`: linear translation, shortest rotation (slerp)."""
         a, b = self.quaternion, other.quaternion
         cosine = dot(a, b)
         if cosine < 0.0:
@@ -66,7 +87,7 @@ class Rigid:
         return Rigid(mixed / _length(mixed), (1 - t) * self.shift + t * other.shift)
 
     def rotation(self) -> NDArray[np.float64]:
-        """The matrix, (3,3). Not to be written to."""
+        """The rotation matrix, (3, 3); read-only."""
         return self._rotation
 
     @cached_property

@@ -11,9 +11,11 @@ import re
 import pytest
 
 import hpccd_core as hc
+from hpccd_core import rigid
 
 MODULES = ["hpccd_core", *(m.name for m in pkgutil.walk_packages(hc.__path__, "hpccd_core.") if "._core" not in m.name)]
 PUBLIC = {name: getattr(hc, name) for name in hc.__all__ if not name.startswith("_")}
+PUBLIC |= {name: getattr(rigid, name) for name in rigid.__all__ if inspect.isfunction(getattr(rigid, name))}
 
 
 @pytest.mark.parametrize("name", MODULES)
