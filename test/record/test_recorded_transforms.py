@@ -142,5 +142,5 @@ def test_without_transforms_says_so(tmp_path):
     for topic in wanted:
         bag.add_topic(Topic(f"/{topic.name}", topic.type_name, []))
     bag.close()
-    with Recording(path) as recording, pytest.raises(RecordingError, match="transforms .*holds none"):
+    with Recording(path) as recording, pytest.raises(RecordingError, match="transforms .*has none"):
         recorded_setup.of_recording(recording)
