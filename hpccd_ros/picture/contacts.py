@@ -262,7 +262,13 @@ def _draw_history(axes, history):
         if history.milliseconds[most] > top:
             at, text = (history.frames[most], 1.0), f"\u2191 {history.milliseconds[most]:.3g} ms"
             times.annotate(
-                text, at, (3, 1), "offset points", xycoords=("data", "axes fraction"), color="#7fd1e0", fontsize=8
+                text,
+                at,
+                (3, 1),
+                xycoords=("data", "axes fraction"),
+                textcoords="offset points",
+                color="#7fd1e0",
+                fontsize=8,
             )
         times.set_ylabel("ms a frame", color="#7fd1e0", fontsize=9)
         _style(times)

@@ -43,7 +43,7 @@ def of_node(node, recording, setup):
         pipeline.load(mesh, *loaded)
     queue = pipeline.start(1000)
     streams = {
-        mesh: MeshSubscriptions(Reception(node, mesh, setup.settings, pipeline, accounts), row["input"])
+        mesh: MeshSubscriptions(Reception(node, mesh, setup.settings, pipeline, accounts), row)
         for mesh, row in setup.meshes.items()
     }
     for message in recording.messages(list(setup.roles)):
