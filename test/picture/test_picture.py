@@ -218,14 +218,15 @@ TETRAHEDRON = np.array([[0, 0, -0.2], [0.3, 0, -1], [-0.2, 0.3, -1], [-0.2, -0.3
 SIDES = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]], np.uint32)
 
 
+@pytest.mark.parametrize("cells", [1, 8], ids=["inside-a-face", "across-faces"])
 @pytest.mark.parametrize("ignored", [(), (("plane", "body"),)])
-def test_faces_that_intersect_another_mesh(ignored):
-    _, vertices, faces, _ = grid(8)
+def test_faces_that_intersect_another_mesh(ignored, cells):
+    _, vertices, faces, _ = grid(cells)
     topologies = (Topology(0, len(vertices), faces.astype(np.uint32)), Topology(0, 4, SIDES))
     builder = SceneBuilder((MeshSettings("plane"), MeshSettings("body")), ignored)
     intersecting = IntersectingFaces(builder)
     for height in (0.0, 0.5):  # below the plane, and with its tip through it
-        plane, body = intersecting.of(topologies, [vertices, TETRAHEDRON + [0.05, 0.02, height]])
+        plane, body = intersecting.of(topologies, [vertices, TETRAHEDRON + [0.5, -0.3, height]])
         through = height > 0 and not ignored
         assert plane.any() == through and not plane.all()
         assert body.tolist() == [through, through, through, False]
