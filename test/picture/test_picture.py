@@ -208,6 +208,16 @@ def test_one_warm_up_does_not_rule_the_axis():
     assert 9.0 < contacts.usual_ceiling(ramp) < 12.0, "an even rise is shown whole"
 
 
+def test_a_spike_beyond_the_axis_is_named():
+    milliseconds = np.full(60, 4.0)
+    for spike, names in ((400.0, ["\u2191 400 ms"]), (5.0, [])):
+        milliseconds[7] = spike
+        history = contacts.History(np.arange(60), np.arange(60), milliseconds.copy(), 3)
+        *_, times = contacts.compose(picture_of(np.zeros((1, 3)), [0.5]), history, size=(320, 200)).axes
+        assert [text.get_text() for text in times.texts] == names
+        assert times.get_ylim()[1] < 10.0
+
+
 def test_a_recording_without_contacts_says_so():
     history = contacts.History(np.arange(5), np.zeros(5, int), np.ones(5), 3)
     *_, curve = contacts.compose(picture_of(np.zeros((0, 3)), []), history, size=(320, 200)).axes
