@@ -341,6 +341,8 @@ def _remedy_for_positions(name: str, array: NDArray[Any], expected: tuple[int, .
     for mesh, count in zip(layout.mesh_names, layout.vertex_counts, strict=True):
         if rows == count < n:
             return f"; these may be of mesh {mesh!r} alone: give all meshes, concatenated or as a dict {{mesh: array}}"
+    if rows == n - 1:
+        return "; one row is missing: from faces that count vertices from 1, subtract 1"
     if rows > n:
         return "; for vertices in no face, add the mesh with n_vertices="
     return ""

@@ -68,7 +68,7 @@ def _require_device(backend: str, method: str) -> None:
 class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierced, OfNearest]):
     """Finds every contact of a scene whose vertices move on straight lines from one set of positions to the next.
 
-    The scene is copied: meshes added to it later do not reach this detector.
+    The scene is copied: meshes and rules that change later do not reach this detector.
 
     Parameters
     ----------
@@ -85,8 +85,8 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
     outputs : iterable of {"points", "normals", "closest"}
         What to compute for each contact beside its features and its time of impact.
     minimum_separation : float
-        Report features that come within this distance, in the unit of the coordinates. Keep it below the shortest
-        edge: neighbours that share no vertex count. 0 reports only contact.
+        Report features that come within this distance, in the unit of the coordinates; 0 reports only contact. Keep
+        it below the distance of neighbours within each mesh (distances() at rest), or these are always reported.
     features : {"vertex_face", "edge_edge"} or both
         Which pairs of features are tested by detect, step, collision_free_step and proximity.
     results : {"host", "device"}
@@ -259,6 +259,14 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
         self._stepping = threading.RLock()  # of the positions of the last step
         self._last: NDArray[Any] | None = None
         self._last_on_device = device_arrays.LastStep()
+        self._complete = True
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if "_complete" in self.__dict__ and not name.startswith("_"):
+            raise AttributeError(
+                f"{name}: a detector's options do not change; make another Detector (for separations: set_separation)"
+            )
+        super().__setattr__(name, value)
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(

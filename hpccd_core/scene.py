@@ -126,6 +126,10 @@ class Scene:
             Names or numbers of the meshes; the same mesh twice: within it.
         separation : float
             Euclidean distance in the unit of the coordinates; 0 reports only contact.
+
+        Notes
+        -----
+        A detector that was made before keeps its separations: use :meth:`Detector.set_separation`.
         """
         self._call("set_separation", mesh_a, mesh_b, arguments.length("separation", separation))
 
@@ -210,9 +214,9 @@ class Scene:
 
         Parameters
         ----------
-        vertex : int or ndarray of int
+        vertex : int or ndarray of int, shape (N,) or (N, 4)
             Scene-wide index of a vertex, as in ``contacts.vf[:, 0]`` and ``contacts.ee``.
-        face : int or ndarray of int
+        face : int or ndarray of int, shape (N,)
             Scene-wide index of a face, as in ``contacts.vf[:, 1]``. Give one of both.
 
         Returns
@@ -244,6 +248,11 @@ class Scene:
             mesh = int(mesh_of(np.array(index), offsets))
             return self.layout.mesh_names[mesh], index - int(offsets[mesh])
         indices = np.asarray(value)
+        if indices.ndim > 1 and not (vertex is not None and indices.shape[1:] == (4,)):
+            raise ValueError(
+                f"{name}: expected shape (N,), or (N, 4) as contacts.ee has, got {indices.shape}; of contacts.vf give "
+                "vertex=contacts.vf[:, 0] or face=contacts.vf[:, 1]"
+            )
         if indices.dtype.kind not in "iu" and indices.size:
             raise TypeError(f"{name}: expected integers, got dtype {indices.dtype}")
         if indices.size and not (0 <= indices.min() and indices.max() < total):

@@ -33,8 +33,8 @@ class SnapshotQueries(Generic[OfNear, OfPierced, OfNearest]):
         vertices : Positions
             As for :meth:`detect`; coordinates up to 1e300.
         distance : float
-            Euclidean, in the unit of the coordinates; 0 reports contact. Beyond the length of an edge its neighbours
-            are reported too: only features that share a vertex are left out.
+            Euclidean, in the unit of the coordinates; 0 reports contact. Neighbours within a mesh are reported
+            too if they are this close: only features that share a vertex are left out.
         stream : Stream, optional
             As for :meth:`detect`.
 

@@ -129,8 +129,8 @@ DETECTION_ROWS = (
         "float",
         0.0,
         "A pair of features whose distance is at most this value at some time of the step is a contact; 0: "
-        "only pairs that touch. Keep it below the shortest edge: neighbouring features that share no vertex "
-        "count",
+        "only pairs that touch. Keep it below the distance of neighbours within each mesh, or these are "
+        "contacts in every step",
         unit="unit of the vertices",
         span=(0.0, FARTHEST),
         change=ALWAYS,

@@ -30,6 +30,12 @@ def scene():
     return scene
 
 
+def one_based():
+    scene = hc.Scene()
+    scene.add_mesh("cloth", CLOTH_FACES + 1)
+    return scene
+
+
 def add(*args, **options):
     return lambda: hc.Scene().add_mesh(*args, **options)
 
@@ -103,6 +109,18 @@ MISTAKES = {
     ),
     "a pickled detector": (lambda: pickle.dumps(detector()()), "cannot be pickled.*pickle its Scene"),
     "a copied detector": (lambda: copy.deepcopy(detector()()), "cannot be pickled or copied"),
+    "an option that is assigned": (
+        lambda: setattr(detector()(), "minimum_separation", 0.1),
+        "minimum_separation: a detector's options do not change; make another.*set_separation",
+    ),
+    "contacts.vf as vertices": (
+        lambda: scene().locate([[0, 1], [2, 3]]),
+        r"vertex: expected shape \(N,\).*got \(2, 2\).*face=contacts.vf\[:, 1\]",
+    ),
+    "positions of faces from 1": (
+        lambda: hc.Detector(one_based()).detect(CLOTH, CLOTH),
+        r"got \(9, 3\); one row is missing: from faces that count vertices from 1, subtract 1",
+    ),
     "an index beyond": (lambda: scene().locate(21), r"vertex: must lie in \[0, 20\], got 21"),
 }
 
@@ -112,6 +130,6 @@ def test_the_error_names_the_remedy(mistake):
     call, words = MISTAKES[mistake]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        with pytest.raises((TypeError, ValueError), match=words) as raised:
+        with pytest.raises((TypeError, ValueError, AttributeError), match=words) as raised:
             call()
     assert len(str(raised.value)) < 300
