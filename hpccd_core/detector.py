@@ -130,6 +130,7 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
     Contacts(1 vertex-face, 0 edge-edge, first at 0.5)
     """
 
+    _complete = False
     _gpu_stages = False  # for measuring, in a class derived from this one: `profile` tells device time by stage too
 
     @overload
@@ -262,11 +263,11 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
         self._complete = True
 
     def __setattr__(self, name: str, value: object) -> None:
-        if "_complete" in self.__dict__ and not name.startswith("_"):
+        if name[0] != "_" and self._complete:
             raise AttributeError(
                 f"{name}: a detector's options do not change; make another Detector (for separations: set_separation)"
             )
-        super().__setattr__(name, value)
+        object.__setattr__(self, name, value)
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(
