@@ -15,8 +15,10 @@ void require_rest(const Scene::Mesh& mesh, const Real* t0, const Real* t1) {
   for (std::size_t i = begin; i < begin + n; ++i)
     // 0 and -0 differ only in their bits; NaN is reported when all coordinates are checked.
     if (t0[i] < t1[i] || t0[i] > t1[i])
-      throw InvalidArgument("vertices_t1[" + std::to_string(i / 3) + "]: moves, but it belongs to mesh '" + mesh.name +
-                            "', which was added as static; add it as one that moves, or keep its vertices");
+      throw InvalidArgument(
+          "vertices_t1[" + std::to_string(i / 3) + "]: moves, but it belongs to mesh '" + mesh.name +
+          "', which was added as static; give its vertices unchanged (in both arrays the meshes in the order "
+          "added, and one dtype), or add it as one that moves");
 }
 
 // Bytes of this number of vertices, in the precision of p.
