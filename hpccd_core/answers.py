@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which classes answer, of the host or of the device, of one world or of several: for type checkers and editors."""
+"""Types of results, on the host or on the device, of one world or of several: for type checkers and editors."""
 
 from typing import TYPE_CHECKING, TypedDict
 
@@ -19,15 +19,15 @@ else:
 
 
 OfMotion = TypeVar("OfMotion", default=Contacts)
-OfNear = TypeVar("OfNear", default=Proximity)
-OfPierced = TypeVar("OfPierced", default=Intersections)
+OfProximity = TypeVar("OfProximity", default=Proximity)
+OfIntersections = TypeVar("OfIntersections", default=Intersections)
 # list[list[Gap]] and an array where there are worlds.
-OfNearest = TypeVar("OfNearest", default=list[Gap])
+OfDistances = TypeVar("OfDistances", default=list[Gap])
 OfStep = TypeVar("OfStep", default=float)
 
 
 class Options(TypedDict, total=False):
-    """What a detector takes wherever its results are, and of whatever worlds."""
+    """Options of every detector."""
 
     accuracy: Accuracy
     backend: Backend

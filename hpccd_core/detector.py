@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _core, arguments, device_arrays
-from .answers import OfMotion, OfNear, OfNearest, OfPierced, OfStep, Options
+from .answers import OfDistances, OfIntersections, OfMotion, OfProximity, OfStep, Options
 from .array_types import ArrayLike, MeshName, Positions, Stream
 from .contacts import Contacts
 from .device_results import DeviceContacts, DeviceIntersections, DeviceProximity
@@ -65,7 +65,7 @@ def _require_device(backend: str, method: str) -> None:
         raise ValueError(f"results: 'device' is not offered by method {method!r}, which runs on CPUs; use 'default'")
 
 
-class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierced, OfNearest]):
+class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfProximity, OfIntersections, OfDistances]):
     """Finds every contact of a scene whose vertices move on straight lines from one set of positions to the next.
 
     The scene is copied: meshes and rules that change later do not reach this detector.

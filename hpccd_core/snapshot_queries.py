@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any, Generic, cast
 
 from . import _core, arguments, device_arrays, device_results
-from .answers import OfNear, OfNearest, OfPierced
+from .answers import OfDistances, OfIntersections, OfProximity
 from .array_types import Positions, Stream
 from .mesh_layout import MeshLayout
 from .options import Results
@@ -14,7 +14,7 @@ from .proximity import Gap, Intersections, Proximity
 from .results import result_of, with_outputs
 
 
-class SnapshotQueries(Generic[OfNear, OfPierced, OfNearest]):
+class SnapshotQueries(Generic[OfProximity, OfIntersections, OfDistances]):
     """Queries of positions at one time. Coordinates may be as large as 1e300."""
 
     worlds: int | None
@@ -25,7 +25,7 @@ class SnapshotQueries(Generic[OfNear, OfPierced, OfNearest]):
     _layout: MeshLayout
     _outputs: tuple[str, ...]
 
-    def proximity(self, vertices: Positions, distance: float, stream: Stream = None) -> OfNear:
+    def proximity(self, vertices: Positions, distance: float, stream: Stream = None) -> OfProximity:
         """All vertex-face and edge-edge pairs within a distance of each other.
 
         Parameters
@@ -53,10 +53,10 @@ class SnapshotQueries(Generic[OfNear, OfPierced, OfNearest]):
         found = self._ask("proximity", vertices, stream, distance)
         on_device = self.results == "device"
         if on_device:
-            return cast(OfNear, device_results.proximity_of(found, self._outputs, self._layout))
-        return cast(OfNear, result_of(Proximity, with_outputs(found, self._outputs), self._layout))
+            return cast(OfProximity, device_results.proximity_of(found, self._outputs, self._layout))
+        return cast(OfProximity, result_of(Proximity, with_outputs(found, self._outputs), self._layout))
 
-    def intersections(self, vertices: Positions, stream: Stream = None) -> OfPierced:
+    def intersections(self, vertices: Positions, stream: Stream = None) -> OfIntersections:
         """All edges that intersect or touch a face with which they share no vertex, coplanar ones included.
 
         Parameters
@@ -79,10 +79,10 @@ class SnapshotQueries(Generic[OfNear, OfPierced, OfNearest]):
         found = self._ask("intersections", vertices, stream)
         on_device = self.results == "device"
         if on_device:
-            return cast(OfPierced, device_results.intersections_of(found, self._layout))
-        return cast(OfPierced, result_of(Intersections, found, self._layout))
+            return cast(OfIntersections, device_results.intersections_of(found, self._layout))
+        return cast(OfIntersections, result_of(Intersections, found, self._layout))
 
-    def distances(self, vertices: Positions, stream: Stream = None) -> OfNearest:
+    def distances(self, vertices: Positions, stream: Stream = None) -> OfDistances:
         """The smallest distance of each pair of meshes that the scene enables, within a mesh too.
 
         Parameters
@@ -114,9 +114,9 @@ class SnapshotQueries(Generic[OfNear, OfPierced, OfNearest]):
             for a, b, distance, kind, features, points in self._ask("distances", vertices, stream)
         ]
         if self.worlds is None:
-            return cast(OfNearest, gaps)
+            return cast(OfDistances, gaps)
         n = len(gaps) // self.worlds
-        return cast(OfNearest, [gaps[k * n : (k + 1) * n] for k in range(self.worlds)])
+        return cast(OfDistances, [gaps[k * n : (k + 1) * n] for k in range(self.worlds)])
 
     def _ask(self, query: str, vertices: object, stream: object, *more: float) -> Any:
         made_on = device_arrays.stream_number(stream)

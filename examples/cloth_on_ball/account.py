@@ -82,9 +82,9 @@ class Account:
         return [
             f"intersections  {sum(self._intersections)} in all {len(self._intersections)} frames",
             f"moves          {frames}, {self._shortened} of them shortened, {self._again} solved more than once",
-            f"free fall      first {self._flight:.2f} s: the cloth's middle is within {self._error:.1e} m of a point's",
+            f"free fall      first {self._flight:.2f} s: its centre is within {self._error:.1e} m of a falling point",
             f"momentum       what gravity, ball and air gave explains it but for {self._unexplained:.1e} N s at most",
-            f"spin           {state.spin:.4f} kg m2/s, of which ball and air gave "
+            f"spin           {state.spin:.4f} kg m2/s, of which the ball and the air gave "
             f"{ledger.ball_spin + ledger.air_spin:.4f}",
             f"energy         {start:.3f} J at the start + {ledger.work:.3f} J from the ball = "
             f"{state.energy:.3f} J there + {self._lost[-1]:.3f} J lost",

@@ -12,9 +12,10 @@ file; for scenes without it, the tier "exact", which the tests compare with rati
 --choose tests tiers, backends and the reports of --ask, prints all settings and names the cheapest one within the
 bounds, as it is written in a program or for the node. These may be bounded, as shares, the worst scene counting:
 
-  misses      of the true contacts, those missed            late   how much later a time is than true (step = 1)
-  inventions  of the reported contacts, the spurious ones   early  how much earlier
-                                                            error  the larger of both
+  misses      of the true contacts, those missed (false negatives)
+  spurious    of the reported contacts, those that are none (false positives)
+  late, early how much later or earlier a time is than true (step = 1)
+  error       the larger of both
 
 Of settings that are equally fast to 5 % it takes the more accurate one. To ask for less than all contacts (--ask) is a
 choice of the model: errors then count against what is asked. Name several where each of them would do.

@@ -44,7 +44,7 @@ ALL = ASKED[0].name
 # Quantities that may be bounded, as --help explains. The worst of several scenes counts.
 QUANTITIES = {
     "misses": lambda row: row["missed"] / max(1, row["true"]),
-    "inventions": lambda row: row["invented"] / max(1, row["reported"]),
+    "spurious": lambda row: row["invented"] / max(1, row["reported"]),
     "late": lambda row: row["latest"],
     "early": lambda row: row["earliest"],
     "error": lambda row: row["toc_worst"],
@@ -131,7 +131,7 @@ class Outcome:
 
     @property
     def wrong(self) -> float:
-        return self.values["misses"] + self.values["inventions"]
+        return self.values["misses"] + self.values["spurious"]
 
     def broken(self, bounds: Sequence[Bound]) -> list[Bound]:
         return [bound for bound in bounds if not bound.keeps(self.values[bound.quantity])]
@@ -202,7 +202,7 @@ def choose(report, bounds: Sequence[Bound]) -> None:
         report.failure(f"--choose: {nothing}; {more}")
         return
     # A share smaller than one in all true contacts cannot be seen.
-    unseen = [str(b) for b in bounds if b.quantity in ("misses", "inventions") and 0 < b.limit < 1 / contacts]
+    unseen = [str(b) for b in bounds if b.quantity in ("misses", "spurious") and 0 < b.limit < 1 / contacts]
     if unseen:
         report.note(
             f"at most {contacts:g} true contacts (asked for: {asked}): whether {', '.join(unseen)} holds shows "

@@ -31,7 +31,7 @@ NO_BOUNDS = {
     "misses>1e-4": "write QUANTITY<NUMBER",
     "misses=0": "QUANTITY<=NUMBER",
     "misses<1e-4; late<1": "with commas between",
-    "mises<1e-4": "choose from misses, inventions, late, early, error",
+    "mises<1e-4": "choose from misses, spurious, late, early, error",
     "misses<few": "few is not a number",
     "late<nan": "bounds nothing",
     "late<-1": "bounds nothing",
@@ -75,7 +75,7 @@ def test_outcomes_are_of_the_worst_scene_and_of_settings_that_all_were_tested_wi
     other = row | {"scene": "b", "missed": 0, "invented": 2, "step_ms": 1.0}
     (found,) = choice.outcomes([row, row | {"step_ms": 99.0}, other, row | {"accuracy": "exact"}])
     assert found.setting == Setting("fast", "cpu") and found.ms == 2.0
-    assert found.values == {"misses": 0.2, "inventions": 0.25, "late": 0.1, "early": 0.2, "error": 0.2}
+    assert found.values == {"misses": 0.2, "spurious": 0.25, "late": 0.1, "early": 0.2, "error": 0.2}
 
 
 class Found:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Moves of the cloth, each proven free of contacts before it is made.
 
-trial   where the cloth would go if nothing were in its way: what comes near on the way are the pairs
+trial   where the cloth would go without contacts: what comes close on this motion are the pairs
 solve   small steps with springs and pairs; repeated where new pairs turn up
 guard   the detector tells how much of the solved move is free; a move that is not free is shortened
 """
