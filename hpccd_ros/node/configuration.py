@@ -2,6 +2,7 @@
 """The parameters of a node: declared and checked when it starts, followed as they change. Parameters and remappings may
 give one topic several uses, which must agree in its type."""
 
+import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -30,6 +31,7 @@ class Configuration:
 
     def __init__(self, node: Node) -> None:
         self._node = node
+        parameters.check_command_line(node, sys.argv)
         self.settings, self.meshes = parameters.declare(node)
         scene_parameters.check(self.settings, self.meshes)
         topics = topic_names.subscribed(self.meshes, robot_parameters.subscribed(self.settings[ROBOT]))

@@ -28,7 +28,7 @@ class Cause(StrEnum):
     """Why stop is true."""
 
     INACTIVE = "inactive"  # the node does not detect
-    UNANSWERED = "unanswered"  # no step was answered yet
+    UNANSWERED = "unanswered"  # no step has a result yet
     NEAR = "near"
     REFUSED = "refused"  # a message was rejected
     FAILED = "failed"  # a detection
@@ -94,7 +94,7 @@ class StopState:
                 for (cause, source), doubt in self._doubts.items()
                 if (meshes := scene.concerned(source.what, source.name)) or not source.of_mesh
             }
-        self._set_cause(Cause.UNANSWERED, "no step was answered since the node was activated", active=True)
+        self._set_cause(Cause.UNANSWERED, "no step has a result since the node was activated", active=True)
 
     def end(self, text: str = "the node is not active") -> None:
         """Results from now on no longer count."""
@@ -113,7 +113,7 @@ class StopState:
 
     def first(self) -> None:
         """A frame came that ends no step: nothing is known of the motion to it."""
-        self._set_cause(Cause.UNANSWERED, "no step was answered since the stream, or a topology, restarted")
+        self._set_cause(Cause.UNANSWERED, "no step has a result since the stream, or a topology, restarted")
 
     def answered(self, near: bool, distance: float, origins: Sequence[Origin]) -> None:
         """The result of a step for this distance; origins: of the meshes at its end, in the order of the scene."""
@@ -150,7 +150,7 @@ class StopState:
         """Another distance is asked for from now on."""
         larger, self.distance = distance > self.distance, distance
         if larger:
-            self._set_cause(Cause.UNANSWERED, f"no step was answered since stop_distance became {distance:g}")
+            self._set_cause(Cause.UNANSWERED, f"no step has a result since stop_distance became {distance:g}")
 
     def refused(self, refusal: Refusal) -> None:
         """The meshes that the message is about are unknown until a valid message about them is in use."""

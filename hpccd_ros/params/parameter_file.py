@@ -54,6 +54,14 @@ def value(text: str) -> Any:
     return found if len({type(entry) for entry in entries}) == 1 else text
 
 
+def parameter_value(text: str) -> Any:
+    """The value that ROS reads from `text` on a command line: YAML, or the text itself if it is none."""
+    try:
+        return yaml.load(text, _Loader)
+    except yaml.YAMLError:
+        return text
+
+
 def _text(path: Path) -> str:
     if path.exists() and not path.is_file():
         raise ValueError("no file")

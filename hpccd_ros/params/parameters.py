@@ -2,6 +2,7 @@
 """The parameters of a node: declared with their descriptors, and watched while it runs. Made from table.py."""
 
 import copy
+import itertools
 from collections.abc import Callable, Container, Iterable
 from typing import Any
 
@@ -15,6 +16,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from hpccd_ros.base import quoting
+from hpccd_ros.params.parameter_file import parameter_value
 from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS, PAIRS, ROBOT, UNCONFIGURED, Row
 from hpccd_ros.params.values import (
     ParameterError,
@@ -50,8 +52,8 @@ def descriptor(row: Row) -> ParameterDescriptor:
         out.description += f" [{row.unit}]"
     if row.choices:
         out.additional_constraints = "one of " + ", ".join(row.choices)
-    elif row.least:
-        out.additional_constraints = f"0 or at least {row.least:g}"
+    elif row.least is not None:
+        out.additional_constraints = f"{row.span[0]:g} or at least {row.least:g}"
     if row.span is not None and row.kind == "int":
         out.integer_range = [IntegerRange(from_value=int(row.span[0]), to_value=int(row.span[1]), step=1)]
     elif row.span is not None:
@@ -109,6 +111,26 @@ def unknown_overrides(node: Node, qos_overrides: Container[str] = ()) -> list[st
     qos_overrides: names of those that are declared only when their topics are there.
     """
     return sorted(name for name in _given(node) if not node.has_parameter(name) and name not in qos_overrides)
+
+
+def check_command_line(node: Node, arguments: list[str]) -> None:
+    """Raises ParameterError for a value on the command line that rcl leaves out.
+
+    If a file gives the parameter with another type, rcl 9 keeps both values and takes the bool, integer or float, so
+    that `-p stop_distance:=5cm` would be without effect.
+    """
+    given = _given(node)
+    for option, assignment in itertools.pairwise(arguments):
+        name, assigned, text = assignment.partition(":=")
+        name = name.rpartition(":")[2]
+        if option not in ("-p", "--param") or not assigned or name not in given:
+            continue
+        value, in_force = parameter_value(text), given[name].value
+        if isinstance(value, str) and not isinstance(in_force, str):
+            raise ParameterError(
+                f"{name}: {quoting.quoted(text)} on the command line has not the type of {in_force!r} in the parameter "
+                "file, and ROS would leave it out; write a value of that type"
+            )
 
 
 def _given(node: Node) -> dict[str, Parameter]:

@@ -16,9 +16,9 @@ ALWAYS, UNCONFIGURED, NEVER = "always", "unconfigured", "never"
 class Row:
     """One parameter.
 
-    ``span``: closed range of a number; ``least``: smallest value besides 0; ``choices``: allowed strings (of each
-    entry). ``change``: ALWAYS; UNCONFIGURED: only while the node is unconfigured, because it is read when the node is
-    configured; NEVER: read-only.
+    ``span``: closed range of a number; ``least``: smallest value besides ``span[0]``, which means off; ``choices``:
+    allowed strings (of each entry). ``change``: ALWAYS; UNCONFIGURED: only while the node is unconfigured, because it
+    is read when the node is configured; NEVER: read-only.
     """
 
     name: str
@@ -27,7 +27,7 @@ class Row:
     text: str
     unit: str = ""
     span: tuple[float, float] | None = None
-    least: float = 0.0
+    least: float | None = None
     choices: tuple[str, ...] = ()
     change: str = UNCONFIGURED
 
@@ -403,10 +403,11 @@ STOP_ROWS = (
         "float",
         -1.0,
         "Publish on stop whether different meshes were within this distance, or touched, during the last "
-        "step, or the state is unknown; 0: whether they touched; negative: no topic stop. It may be changed "
+        "step, or the state is unknown; 0: whether they touched; -1: no topic stop. It may be changed "
         "at any time, but only switched on or off while the node is unconfigured",
         unit="unit of the vertices",
         span=(-1.0, FARTHEST),
+        least=0.0,
         change=ALWAYS,
     ),
     Row(

@@ -19,8 +19,8 @@ def unusable_value(row: Row, value: Any) -> str | None:
         return None if row.default is None else f"{row.name}: has no value; {expected(row)}"
     if row.span is not None and not row.span[0] <= value <= row.span[1]:
         return f"{row.name}: {value} is outside {row.span[0]} .. {row.span[1]}"
-    if row.least and 0 < value < row.least:
-        return f"{row.name}: {value} is not valid; use 0, or at least {row.least:g}"
+    if row.least is not None and row.span[0] < value < row.least:
+        return f"{row.name}: {value} is not valid; use {row.span[0]:g}, or at least {row.least:g}"
     entries = value if row.kind == "string[]" else [value]
     if row.choices:
         for entry in entries:
@@ -57,8 +57,8 @@ def allowed(row: Row) -> str:
     """The allowed values in Markdown; empty: any of the type."""
     if row.choices:
         return ", ".join(f"`{choice}`" for choice in row.choices)
-    if row.least:
-        return f"0, {row.least:g} .. {row.span[1]:,}"
+    if row.least is not None:
+        return f"{row.span[0]:g}, {row.least:g} .. {row.span[1]:,}"
     if row.span is not None:
         return f"{row.span[0]:,} .. {row.span[1]:,}"
     return ""

@@ -145,7 +145,7 @@ SIZE = _same("scene", "triangles", "contacts")
 OVER_ALL = {"first": "first (/ all)", "step": "`collision_free_step` (/ all)", "trial": "trial steps (/ all)"}
 METHODS = {f"`{name}`": name for name in ("default", "published", "naive", "front")}
 TABLES = {
-    "peer-exact": Table(
+    "peer": Table(
         ("peer-h200-4-of-16-cores", "gpu-exact-h200"),
         SIZE
         | _whole(contacts="contacts")
@@ -153,16 +153,6 @@ TABLES = {
         | {"hpccd, earliest": cell("cpu first", shown=lambda row: row["median_ms"])}
         | {"hpccd, all": "median_ms", "hpccd on the GPU, all": "gpu_ms"},
         _with_gpu,
-    ),
-    "peer": Table(
-        ("cpu-4-cores",),
-        SIZE
-        | _whole(contacts="contacts")
-        | {"hpccd, all contacts, ms": "median_ms"}
-        | {'`report="first"`, ms': cell("cpu first", shown=lambda row: row["median_ms"])}
-        | {"ipctk, ms": cell("ipctk", shown=lambda row: row["median_ms"])}
-        | _to(0, times_faster="times_faster_than_ipctk"),
-        by("scene", "variant"),
     ),
     "scaling": Table(
         ("scaling-4-cores",),

@@ -36,10 +36,10 @@ def test_true_while_anything_is_near(start_stream):
     """From before the first answer on; at any time of a step, whole surfaces, as near counts as nearer."""
     stream = start_stream(features=["edge_edge"], accuracy="fast")
     stream.expect(True)
-    stream.status("unanswered", "no step was answered since the node was activated")
+    stream.status("unanswered", "no step has a result since the node was activated")
     stream.topologies()
     stream.frame(2.0)
-    stream.status("unanswered", "no step was answered since the stream, or a topology, restarted")
+    stream.status("unanswered", "no step has a result since the stream, or a topology, restarted")
     stream.frame(1.0)
     stream.expect(False)
     assert stream.status("")["stop"] == "False"
@@ -385,9 +385,9 @@ def test_frames_that_waited_while_the_node_was_held_up_are_old(start_stream):
 def test_the_distance_may_change_and_not_be_switched_off(start_stream):
     stream = start_stream()
     stream.start()
-    for value in (-1.0, -0.5):
+    for value, reason in ((-1.0, "switch the topic stop on or off"), (-0.5, "use -1, or at least 0")):
         answer = set_parameter(stream.node, "stop_distance", value)
-        assert not answer.successful and "switch the topic stop on or off" in answer.reason
+        assert not answer.successful and reason in answer.reason
     assert set_parameter(stream.node, "stop_distance", 1.5).successful
     stream.expect(True)
     stream.status("unanswered", "since stop_distance became 1.5")

@@ -92,6 +92,7 @@ def test_overrides_reach_the_settings(node_with):
         ({"threads": -1}, "threads"),
         ({"record_split_size": 1e-6}, "record_split_size: 1e-06 is not valid; use 0, or at least 0.01"),
         ({"record_split_time": 1e-9}, "record_split_time: 1e-09 is not valid; use 0, or at least 0.1"),
+        ({"stop_distance": -0.05}, "stop_distance: -0.05 is not valid; use -1, or at least 0"),
         ({"threads": "many"}, "threads"),
         ({"stamp_tolerance": True}, "stamp_tolerance"),
         ({"stamp_tolerance": -1}, "stamp_tolerance"),

@@ -22,7 +22,8 @@ def start(arguments, output):
     os.dup2(output.fileno(), 1)
     os.dup2(output.fileno(), 2)
     try:
-        status = run.main(["hpccd_node", *arguments])
+        sys.argv = ["hpccd_node", *arguments]
+        status = run.main()
     except BaseException:
         traceback.print_exc()
         status = 1

@@ -115,7 +115,7 @@ WARNED = {
 # Name -> (parameters, what the log says); the node cannot be configured: exit status 1.
 NOT_CONFIGURED = {
     "file-that-is-not-there": (CLOTH | {"mesh.cloth.file": "/nowhere/cloth.obj"}, "/nowhere/cloth.obj: no such file"),
-    "file-of-another-kind": (CLOTH | {"mesh.cloth.file": __file__}, "test_natural_mistakes.py: "),
+    "file-of-another-kind": (CLOTH | {"mesh.cloth.file": __file__}, "test_node_mistakes.py: "),
     "everything-static": (CLOTH | {"mesh.cloth.static": True}, "at least one mesh must not be static"),
 }
 ARGUMENTS = {
@@ -129,6 +129,10 @@ ARGUMENTS = {
 }
 
 
+# Values on the command line of a parameter that the file gives as a float: ROS alone would leave them out.
+OVERRIDDEN = ["5cm", "0,05", "'0.2'", "1e-2m"]
+
+
 @pytest.fixture(scope="module")
 def outcomes(tmp_path_factory):
     """{name: [exit status, output]} of all starts."""
@@ -138,6 +142,10 @@ def outcomes(tmp_path_factory):
         file = folder / f"{name}.yaml"
         file.write_text(json.dumps({"/**": {"ros__parameters": parameters}}))  # JSON is YAML
         starts[name] = ["--ros-args", "--params-file", str(file), "-r", f"__ns:=/mistake_{os.getpid()}"]
+    file = folder / "overridden.yaml"
+    file.write_text(json.dumps({"/**": {"ros__parameters": TWO | {"stop_distance": 0.05}}}))
+    for value in OVERRIDDEN:
+        starts[value] = ["--ros-args", "--params-file", str(file), "-p", f"stop_distance:={value}"]
     done = subprocess.run(
         [sys.executable, str(SUPPORT / "forked_nodes.py")],
         input=json.dumps(starts),
@@ -164,6 +172,12 @@ def test_mistake_at_the_start(outcomes, name):
     ended, output = outcomes[name]
     assert ended == status and says in output, output
     assert "Traceback" not in output
+
+
+@pytest.mark.parametrize("value", OVERRIDDEN)
+def test_text_on_the_command_line_does_not_leave_the_number_of_a_file_in_force(outcomes, value):
+    ended, output = outcomes[value]
+    assert ended == 2 and "on the command line has not the type of 0.05 in the parameter file" in output, output
 
 
 def test_foreign_parameters_are_each_warned_of_once(outcomes):
