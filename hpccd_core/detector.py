@@ -263,7 +263,7 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfProximity, OfI
         self._complete = True
 
     def __setattr__(self, name: str, value: object) -> None:
-        if name[0] != "_" and self._complete:
+        if name[0] != "_" and self._complete and name in _OPTIONS:
             raise AttributeError(
                 f"{name}: a detector's options do not change; make another Detector (for separations: set_separation)"
             )
