@@ -82,8 +82,13 @@ class WithSides:
 
 def with_outputs(found: dict[str, Any], outputs: tuple[str, ...]) -> dict[str, Any]:
     """What the core returns, with the outputs that were asked for in a dict of their own."""
-    every = {name: found.pop(name) for name in OUTPUTS if name in found}
-    found["outputs"] = {name: array for name, array in every.items() if name in outputs}
+    # A loop, not comprehensions, which cost 1.3 us of a call of 15.
+    kept = {}
+    for name in OUTPUTS:
+        array = found.pop(name, None)
+        if array is not None and name in outputs:
+            kept[name] = array
+    found["outputs"] = kept
     return found
 
 
