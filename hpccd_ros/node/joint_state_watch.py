@@ -39,7 +39,7 @@ class JointStateWatch:
             self._names = names
 
     def silent(self, publishers: int) -> bool:
-        """Whether no message has come for a while from so many publishers."""
+        """Whether no message has come for a while from this number of publishers."""
         return self._silence.lasts((self._received, publishers))
 
     def warnings(self) -> list[str]:
