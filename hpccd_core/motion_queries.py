@@ -131,17 +131,17 @@ class MotionQueries(Generic[OfMotion, OfStep]):
         return result_of(Contacts, with_outputs(found, self._outputs), self._layout)
 
     def _of_motion(self, query: str, vertices_t0: object, vertices_t1: object, stream: object = None) -> Any:
-        on_device = [device_arrays.is_on_device(v) for v in (vertices_t0, vertices_t1)]
+        on_device = device_arrays.is_on_device(vertices_t0)
         made_on = device_arrays.stream_number(stream)
-        if all(on_device):
-            return self._of_places(query, *self._places(vertices_t0, vertices_t1, made_on))
-        if any(on_device):
+        if device_arrays.is_on_device(vertices_t1) != on_device:
             raise TypeError("vertices_t0, vertices_t1: one is a device array, the other is not; give both in one place")
+        if on_device:
+            return self._of_places(query, *self._places(vertices_t0, vertices_t1, made_on))
         start = arguments.vertices("vertices_t0", vertices_t0, self._shape, self._layout)
         end = arguments.vertices("vertices_t1", vertices_t1, self._shape, self._layout)
         if start.dtype != end.dtype:  # widening a float32 is exact
             start, end = arguments.widened(start), arguments.widened(end)
-        return getattr(self._core, query)(*(device_arrays.on_host(end, made_on) for end in (start, end)))
+        return getattr(self._core, query)(device_arrays.on_host(start, made_on), device_arrays.on_host(end, made_on))
 
     def _places(
         self, vertices_t0: object, vertices_t1: object, made_on: int | None
