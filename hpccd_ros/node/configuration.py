@@ -24,7 +24,7 @@ Meshes = dict[str, dict[str, Any]]
 
 class Configuration:
     """``settings``, ``meshes`` (name -> parameters mesh.NAME.*) and the detector's ``options`` as they are now;
-    ``robots``: those whose description is known.
+    ``robots``: those whose description is known; ``warnings``: about parameter files without effect.
 
     Raises ParameterError for parameters that the node cannot start with.
     """
@@ -40,6 +40,9 @@ class Configuration:
         not_ours = parameters.unknown_overrides(node, qos_overrides.known(node, topics))
         for name in unknown.check(not_ours, self.settings):
             node.get_logger().warning(unknown.warning(name))
+        self.warnings = parameters.files_without_section(node, sys.argv)
+        for warning in self.warnings:
+            node.get_logger().warning(warning)
         self.robots: Robots = NO_ROBOTS
         self.options = scene_parameters.detector_options(self.settings)
         if why := unusable_options(self.options) or unrecordable(self.settings):

@@ -217,7 +217,7 @@ class HpccdNode(GuardedLifecycleNode):
             self.get_clock().now().to_msg(),
             state=self.state,
             waiting=self._stream.waiting if self._stream is not None else 0,
-            warnings=[*self._errors(), *self._warnings()],
+            warnings=[*self._configuration.warnings, *self._errors(), *self._warnings()],
             silent=self._silent(),
             service=self._jobs.counts,
             errors=(self.errors.count, self.errors.last),

@@ -2,16 +2,20 @@
 """Read a ROS parameter file, as a node is given one with --params-file."""
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.base.quoting import printable
+from hpccd_ros.base.quoting import listed, printable, shortened
 
 # Characters: far above any that a person writes, far below a recording named by mistake.
 MOST = 1_000_000
+_PARAMETERS = "ros__parameters"
+# ValueError: no UTF-8, or what YAML takes for a date and is none. RecursionError: nested too deeply.
+_UNREADABLE = (yaml.YAMLError, ValueError, RecursionError)
 
 
 def read_parameters(path) -> dict[str, Any]:
@@ -20,11 +24,10 @@ def read_parameters(path) -> dict[str, Any]:
         tree = yaml.load(_text(Path(path)), _Loader)
     except OSError as error:
         raise UserError(f"--params {path}: cannot be read: {error.strerror}") from error
-    # ValueError: no UTF-8, or what YAML takes for a date and is none. RecursionError: nested too deeply.
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+    except _UNREADABLE as error:
         raise UserError(f"--params {path}: cannot be read: {' '.join(str(error).split())}") from error
     sections = tree.values() if isinstance(tree, dict) else ()
-    found = [section.get("ros__parameters") if isinstance(section, dict) else None for section in sections]
+    found = [section.get(_PARAMETERS) if isinstance(section, dict) else None for section in sections]
     if not found or not all(isinstance(parameters, dict) for parameters in found):
         raise UserError(
             f"--params {path}: not a ROS parameter file; write node name or /**, ros__parameters, names and values"
@@ -36,6 +39,21 @@ def read_parameters(path) -> dict[str, Any]:
         if value is None:
             raise UserError(printable(f"--params {path}: {name} has no value"))
     return flat
+
+
+def without_section(path, node: str) -> str:
+    """The warning about a parameter file whose sections are all for other nodes, so that ROS ignores it; "": one is
+    for the node of this full name, or the file has none."""
+    try:
+        sections = list(_sections("", yaml.load(_text(Path(path)), _Loader)))
+    except (OSError, *_UNREADABLE):
+        return ""  # ROS reports it
+    if not sections or any(_matches(section, node) for section in sections):
+        return ""
+    return printable(
+        f"parameter file {shortened(path)}: has no section for this node and so no effect on it; name a section "
+        f"{node} or /**, not {listed(sections)}"
+    )
 
 
 def value(text: str) -> Any:
@@ -70,6 +88,23 @@ def _text(path: Path) -> str:
     if len(text) > MOST:
         raise ValueError(f"more than {MOST:,} characters")
     return text
+
+
+def _sections(namespace: str, tree: Any) -> Iterator[str]:
+    """The full names of nodes, or patterns of them, that have parameters in a file."""
+    for key, branch in tree.items() if isinstance(tree, dict) else ():
+        name = f"{namespace}/{str(key).strip('/')}"
+        if isinstance(branch, dict) and _PARAMETERS in branch:
+            yield name
+        else:
+            yield from _sections(name, branch)
+
+
+def _matches(section: str, node: str) -> bool:
+    """Whether ROS takes the section for this node: * is one part of a name, ** any number of them."""
+    parts = {"/**": "(/[^/]+)*", "/*": "/[^/]+"}
+    pattern = re.sub(r"/[^/]*", lambda part: parts.get(part[0], re.escape(part[0])), section)
+    return re.fullmatch(pattern, node) is not None
 
 
 def _flat(prefix: str, branch: dict) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from hpccd_ros.base import quoting
-from hpccd_ros.params.parameter_file import parameter_value
+from hpccd_ros.params.parameter_file import parameter_value, without_section
 from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS, PAIRS, ROBOT, UNCONFIGURED, Row
 from hpccd_ros.params.values import (
     ParameterError,
@@ -131,6 +131,13 @@ def check_command_line(node: Node, arguments: list[str]) -> None:
                 f"{name}: {quoting.quoted(text)} on the command line has not the type of {in_force!r} in the parameter "
                 "file, and ROS would leave it out; write a value of that type"
             )
+
+
+def files_without_section(node: Node, arguments: list[str]) -> list[str]:
+    """The warnings about parameter files on the command line that have no section for this node."""
+    name = node.get_fully_qualified_name()
+    files = (file for option, file in itertools.pairwise(arguments) if option == "--params-file")
+    return [warning for file in files if (warning := without_section(file, name))]
 
 
 def _given(node: Node) -> dict[str, Parameter]:

@@ -129,6 +129,20 @@ ARGUMENTS = {
 }
 
 
+# Name of the only section in a file -> whether it is for the node /NAMESPACE/hpccd; the node starts.
+SECTIONS = {
+    "hpccd_node": False,
+    "/hpccd": False,
+    "/NS/hpccd_node": False,
+    "/NS/hpccd/more": False,
+    "/*/hpccd_node": False,
+    "/*": False,
+    "/**": True,
+    "/**/hpccd": True,
+    "/*/hpccd": True,
+    "/NS/*": True,
+    "NS/hpccd": True,
+}
 # Values on the command line of a parameter that the file gives as a float: ROS alone would leave them out.
 OVERRIDDEN = ["5cm", "0,05", "'0.2'", "1e-2m"]
 
@@ -146,6 +160,12 @@ def outcomes(tmp_path_factory):
     file.write_text(json.dumps({"/**": {"ros__parameters": TWO | {"stop_distance": 0.05}}}))
     for value in OVERRIDDEN:
         starts[value] = ["--ros-args", "--params-file", str(file), "-p", f"stop_distance:={value}"]
+    for number, section in enumerate(SECTIONS):
+        namespace = f"section_{os.getpid()}_{number}"
+        file = folder / f"section_{number}.yaml"
+        name = section.replace("NS", namespace)
+        file.write_text(json.dumps({name: {"ros__parameters": {"threads": number + 1}}}))
+        starts[section] = ["--ros-args", "--params-file", str(file), "-r", f"__ns:=/{namespace}"]
     done = subprocess.run(
         [sys.executable, str(SUPPORT / "forked_nodes.py")],
         input=json.dumps(starts),
@@ -178,6 +198,13 @@ def test_mistake_at_the_start(outcomes, name):
 def test_text_on_the_command_line_does_not_leave_the_number_of_a_file_in_force(outcomes, value):
     ended, output = outcomes[value]
     assert ended == 2 and "on the command line has not the type of 0.05 in the parameter file" in output, output
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_a_file_without_a_section_for_the_node_is_reported(outcomes, section):
+    ended, output = outcomes[section]
+    reported = "has no section for this node and so no effect on it; name a section /section_" in output
+    assert ended == 0 and reported != SECTIONS[section], output
 
 
 def test_foreign_parameters_are_each_warned_of_once(outcomes):
