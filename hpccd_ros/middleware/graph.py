@@ -7,7 +7,7 @@ from typing import Any
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.node import Node, NodeNameNonExistentError
 
-from hpccd_ros.base.quoting import listed, shortened, suggestion
+from hpccd_ros.base.quoting import listed, nearest, shortened, suggestion
 from hpccd_ros.middleware import environment
 
 _DETECT = "hpccd/srv/Detect"
@@ -51,6 +51,19 @@ def endpoint_node(endpoint: Any) -> str:
     if endpoint.node_name == "_CREATED_BY_BARE_DDS_APP_":
         return "that is not a ROS node"
     return f"of node {shortened(full_name(endpoint.node_name, endpoint.node_namespace))}"
+
+
+def near_topic(node: Node, topic: str, type_name: str) -> str:
+    """For the end of a warning that ``topic`` (full name) has no publisher: one of this type that has some, and is
+    spelled alike or has the same last part; "": there is none."""
+    there = {
+        name
+        for name, types in node.get_topic_names_and_types()
+        if type_name in types and name != topic and node.count_publishers(name)
+    }
+    last = topic.rpartition("/")[2]
+    near = nearest(topic, there) or min((name for name in there if name.rpartition("/")[2] == last), default="")
+    return f"; {near} has publishers: if that is meant, start the node with -r {topic}:={near}" if near else ""
 
 
 def no_node(node: Node, remedy: str, wanted: str = "") -> str:

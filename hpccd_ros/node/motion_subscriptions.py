@@ -18,7 +18,7 @@ from hpccd_ros.base.quoting import counted
 from hpccd_ros.frames.arrivals import InterleavedSequences, RateLimit
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
-from hpccd_ros.middleware import executors, joint_messages, message_types, qos, transform_topics
+from hpccd_ros.middleware import executors, graph, joint_messages, message_types, qos, transform_topics
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.middleware.transform_topics import TransformTopic
 from hpccd_ros.node.accounts import Accounts
@@ -82,7 +82,11 @@ class JointSubscriptions:
     def warnings(self) -> list[str]:
         """Topics without a publisher, publishers that are not connected, and joint states that move nothing."""
         silent = [subscription.topic for subscription in self._subscriptions if not subscription.publishers]
-        lines = [f"{topic}: it has no publisher; start one, or let it publish on this topic" for topic in silent]
+        lines = [
+            f"{topic}: it has no publisher; start one, or let it publish on this topic"
+            f"{graph.near_topic(self._node, topic, message_types.JOINT_STATES)}"
+            for topic in silent
+        ]
         lines += [line for watch in self._watches.values() for line in watch.warnings()]
         return lines + unconnected(self._subscriptions)
 

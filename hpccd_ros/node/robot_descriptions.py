@@ -8,7 +8,7 @@ from typing import Any
 from std_msgs.msg import String
 
 from hpccd_ros.base.quoting import shortened
-from hpccd_ros.middleware import executors, qos, robot_files
+from hpccd_ros.middleware import executors, graph, message_types, qos, robot_files
 from hpccd_ros.node.input_subscription import InputSubscription, unconnected
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.params import robot_parameters
@@ -70,9 +70,10 @@ class RobotDescriptions:
     def warnings(self) -> list[str]:
         """Robots that are not known, and publishers that are not connected."""
         waiting = [
-            f"robot {name} waits for its description on {self._node.resolve_topic_name(topic)}{self._why(topic)}"
+            f"robot {name} waits for its description on {full}{self._why(full)}"
             for name, topic in self._topics.items()
             if name not in self.robots and name not in self._refused
+            for full in [self._node.resolve_topic_name(topic)]
         ]
         return waiting + unconnected(self._subscriptions.values())
 
@@ -82,7 +83,10 @@ class RobotDescriptions:
 
     def _why(self, topic: str) -> str:
         if not self._node.count_publishers(topic):
-            return ", which has no publisher; start robot_state_publisher, or name its topic or a URDF file"
+            return (
+                ", which has no publisher; start robot_state_publisher, or name its topic or a URDF file"
+                f"{graph.near_topic(self._node, topic, message_types.DESCRIPTION)}"
+            )
         return ": its publisher must be latched (reliable, transient local)"
 
     def _read_files(self, name: str) -> None:

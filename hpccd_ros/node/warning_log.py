@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 LASTS = 2.0
 # s without a cause, after which it is logged again if it comes back.
 GONE = 10.0
-# Stamps and counts, by which two texts of one cause differ; numbers within names stay.
+# Stamps and counts, by which two texts of one cause differ, as they do by the remedy; numbers within names stay.
 _NUMBER = re.compile(r"(?<![\w/])-?\d[\d.,]*(?!\w)")
 
 
@@ -28,7 +28,7 @@ class WarningLog:
         now = self._clock()
         for lines, least in ((new, LASTS), (lasting, 0.0)):
             for text in lines:
-                cause = _NUMBER.sub("#", text)
+                cause = _NUMBER.sub("#", text.partition("; ")[0])
                 self._last[cause] = now
                 if now - self._first.setdefault(cause, now) >= least and cause not in self._logged:
                     self._logged.add(cause)

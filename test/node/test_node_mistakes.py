@@ -13,6 +13,7 @@ from geometry_msgs.msg import PoseStamped
 from hpccd.msg import MeshTopology, MeshVertices
 from sensor_msgs.msg import JointState, PointCloud2
 from sources import SOURCES, SUPPORT
+from std_msgs.msg import String
 from waving_sheet import sheet_faces, sheet_positions
 
 from hpccd_ros.middleware import fields, mesh_messages, qos
@@ -20,6 +21,12 @@ from hpccd_ros.middleware import fields, mesh_messages, qos
 CLOTH = {"meshes": ["cloth"]}
 TWO = {"meshes": ["cloth", "ball"]}
 ARM = {"robots": ["arm"], "frame_id": "world"}
+BY_JOINTS = {
+    "robots": ["arm"],
+    "robot.arm.description": "URDF",
+    "robot.arm.joint_states": "joint_states",
+    "robot.arm.pose": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+}
 
 # Name -> (parameters, what the node says); it does not start: exit status 2.
 REJECTED = {
@@ -334,35 +341,32 @@ IN_STREAM = {
         "NS/meshes/cloth/vertices: it has no publisher; start one",
     ),
     "joint-states-without-stamp": Mistake(
-        {
-            "robots": ["arm"],
-            "robot.arm.description": "URDF",
-            "robot.arm.joint_states": "joint_states",
-            "robot.arm.pose": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
-        },
+        BY_JOINTS,
         {"joint_states": (JointState, RELIABLE, [joints("shoulder", 0)])},
         "NS/joint_states: header.stamp is 0 in every message, so the robot does not move; let the publisher set it",
     ),
     "joint-states-of-another-robot": Mistake(
-        {
-            "robots": ["arm"],
-            "robot.arm.description": "URDF",
-            "robot.arm.joint_states": "joint_states",
-            "robot.arm.pose": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
-        },
+        BY_JOINTS,
         {"joint_states": (JointState, RELIABLE, [joints("left_shoulder", k * 10**8) for k in range(1, 1000)])},
         "NS/joint_states: no message names a joint of the robot (shoulder); the last one names left_shoulder; use the "
         "names of its description; did you mean shoulder?",
     ),
     "no-joint-states": Mistake(
-        {
-            "robots": ["arm"],
-            "robot.arm.description": "URDF",
-            "robot.arm.joint_states": "joint_states",
-            "robot.arm.pose": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
-        },
+        BY_JOINTS,
         {},
         "NS/joint_states: it has no publisher; start one",
+    ),
+    "joint-states-on-another-topic": Mistake(
+        BY_JOINTS,
+        {"joint_state": (JointState, RELIABLE, [joints("shoulder", k * 10**8) for k in range(1, 1000)])},
+        "NS/joint_states: it has no publisher; start one, or let it publish on this topic; NS/joint_state has "
+        "publishers: if that is meant, start the node with -r NS/joint_states:=NS/joint_state",
+    ),
+    "description-in-another-namespace": Mistake(
+        {"robots": ["arm"], "frame_id": "world"},
+        {"arm/robot_description": (String, LATCHED, [String(data=URDF)])},
+        "robot_state_publisher, or name its topic or a URDF file; NS/arm/robot_description has publishers: if that is "
+        "meant, start the node with -r NS/robot_description:=NS/arm/robot_description",
     ),
     "no-description": Mistake(
         {"robots": ["arm"], "frame_id": "world"},
