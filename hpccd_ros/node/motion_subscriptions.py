@@ -118,7 +118,7 @@ class JointSubscriptions:
             self._accounts.inputs.add(topic, sent)
             stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
             self._accounts.metrics.stamped(topic, stamp)
-            self._watches[topic].receive(stamp, message.name)
+            self._watches[topic].receive(stamp, message.name, message.position)
             moved = [self._of_robots[robot] for robot in robots if robot in self._of_robots]
             refusals = joint_messages.fill(moved, message, topic, sent, publisher)
             if (kept := joint_messages.kept(message)) is not None:

@@ -18,6 +18,7 @@ from hpccd_ros.frames.types import MeshFrame
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.joint_history import JointHistory, NoJointStateError
 from hpccd_ros.robots.robot import Robot
+from hpccd_ros.robots.urdf import RobotJoint
 
 
 @dataclass
@@ -54,9 +55,10 @@ class JointFrames:
         return len(self._waiting) * len(self.names)
 
     @property
-    def joints(self) -> Sequence[str]:
-        """Names of the joints that need a position."""
-        return self._robot.kinematics.inputs
+    def joints(self) -> dict[str, RobotJoint]:
+        """The joints that need a position, by name."""
+        needed = set(self._robot.kinematics.inputs)
+        return {joint.name: joint for joint in self._robot.description.joints if joint.name in needed}
 
     @property
     def begun(self) -> int:

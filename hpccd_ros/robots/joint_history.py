@@ -155,7 +155,7 @@ class JointHistory:
             reasons.append(f"the last position of {listed(known)}, of {last} ns, is from before the clock was set back")
         if never := [name for name in lacking if name not in self._last and name not in self._unusable]:
             named = f"; the last one names {listed(self._named)}" if self._named else ""
-            reasons.append(f"no joint state has named {listed(never)}{named}")
+            reasons.append(f"no joint state has contained {listed(never)}{named}")
         raise NoJointStateError("; ".join(reasons), final=False)
 
     def _reasons(self, names: Sequence[str]) -> list[str]:

@@ -238,8 +238,8 @@ def topology():
     return message
 
 
-def joints(name, stamp):
-    message = JointState(name=[name], position=[0.1])
+def joints(name, stamp, position=0.1):
+    message = JointState(name=[name], position=[position])
     message.header.stamp = fields.ns_to_stamp(stamp)
     return message
 
@@ -344,6 +344,12 @@ IN_STREAM = {
         BY_JOINTS,
         {"joint_states": (JointState, RELIABLE, [joints("shoulder", 0)])},
         "NS/joint_states: header.stamp is 0 in every message, so the robot does not move; let the publisher set it",
+    ),
+    "joint-states-in-degrees": Mistake(
+        BY_JOINTS,
+        {"joint_states": (JointState, RELIABLE, [joints("shoulder", k * 10**8, 45.0) for k in range(1, 1000)])},
+        "NS/joint_states: joint shoulder is at 45 rad, outside its limits -1 .. 1 in the description; positions are in "
+        "rad, and this one may be in degrees",
     ),
     "joint-states-of-another-robot": Mistake(
         BY_JOINTS,

@@ -206,7 +206,8 @@ def test_frames_wait_for_joint_states_and_take_what_lies_between_two(start_node)
     cloth(node, 10)
     values = node.frames_status(waiting=4)
     node.wait_until(
-        lambda: "crane waits: no joint state has named turn, reach" in node.peer.statuses["frames"][1], "a word of it"
+        lambda: "crane waits: no joint state has contained turn, reach" in node.peer.statuses["frames"][1],
+        "a word of it",
     )
     half = crane.joint_state(0, 5)
     half.name, half.position = half.name[:1], half.position[:1]
@@ -610,7 +611,7 @@ def test_a_robot_alone_says_what_it_waits_for(start_node, by):
     else:
         joints = node.peer.publisher(JointState, "joint_states")
         joints.publish(JointState(name=["turn"], position=[0.0]))
-        awaited = "no frame yet: crane: no joint state has named reach; the last one names turn"
+        awaited = "no frame yet: crane: no joint state has contained reach; the last one names turn"
     node.wait_until(lambda: awaited in node.peer.statuses["frames"][1], "a word of it")
     for k in (1, 2):
         for message in [crane.joint_state(k, k)] if by == "joints" else transforms(k, "left_"):

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each cause is in the log once, until it has been gone for a while."""
 
+import math
+
 import pytest
 
+from hpccd_core.rigid.transform import IDENTITY
 from hpccd_ros.node.joint_state_watch import JointStateWatch
 from hpccd_ros.node.silence import Silence
 from hpccd_ros.node.warning_log import WarningLog
+from hpccd_ros.robots.urdf import RobotJoint
 
 
 class Clock:
@@ -73,10 +77,14 @@ def test_silence(clock):
     assert silence.lasts(1)
 
 
+def joint(name, kind="revolute", limits=(-2.0, 2.0)):
+    return RobotJoint(name, kind, "base", name, IDENTITY, (0.0, 0.0, 1.0), limits)
+
+
 @pytest.fixture
 def watch(clock):
     watch = JointStateWatch("/joint_states", clock)
-    watch.use([("shoulder", "elbow")])
+    watch.use([{name: joint(name) for name in ("shoulder", "elbow")}])
     assert watch.warnings() == []
     return watch
 
@@ -142,3 +150,44 @@ def test_before_a_robot_is_known_no_name_is_wrong(clock):
         watch.receive(k, ["anything"])
         clock.now += 1.0
     assert watch.warnings() == []
+
+
+@pytest.mark.parametrize(
+    "kind, limits, position, remedy",
+    [
+        ("revolute", (-2.0, 2.0), 45.0, "positions are in rad, and this one may be in degrees"),
+        ("revolute", (-2.0, 2.0), -2.05, "positions are in rad, and this one may be in degrees"),
+        ("prismatic", (0.0, 0.3), 120.0, "positions are in m, and this one may be in millimetres"),
+        ("prismatic", (1.0, 1.3), 0.5, "send another position, or correct the limits"),
+        ("revolute", (-2.0, 2.0), 400.0, "send another position, or correct the limits"),
+        ("revolute", (-2.0, 2.0), math.inf, "send another position, or correct the limits"),
+        ("revolute", (-2.0, 2.0), 2.03, None),
+        ("revolute", (0.0, 0.0), 45.0, None),
+        ("continuous", None, 45.0, None),
+        ("revolute", (-2.0, 2.0), math.nan, None),  # rejected elsewhere
+    ],
+)
+def test_positions_outside_the_limits(clock, kind, limits, position, remedy):
+    watch = JointStateWatch("/joint_states", clock)
+    watch.use([{"elbow": joint("elbow", kind, limits)}])
+    watch.receive(1, ["gripper", "elbow"], [99.0, position])
+    if remedy is None:
+        assert watch.warnings() == []
+        return
+    unit = "rad" if kind == "revolute" else "m"
+    assert watch.warnings() == [
+        f"/joint_states: joint elbow is at {position:g} {unit}, outside its limits {limits[0]:g} .. {limits[1]:g} in "
+        f"the description; {remedy}"
+    ]
+    watch.receive(2, ["gripper"], [99.0])
+    assert len(watch.warnings()) == 1
+    watch.receive(3, ["elbow"], [limits[0]])
+    assert watch.warnings() == []
+
+
+def test_many_positions_outside_the_limits(watch):
+    names = [f"joint_{k}" for k in range(9)]
+    watch.use([{name: joint(name)} for name in names])
+    watch.receive(1, names, [90.0] * 9)
+    lines = watch.warnings()
+    assert len(lines) == 4 and lines[-1] == "/joint_states: 6 more joints outside the limits of the description"

@@ -44,11 +44,11 @@ def test_order_of_arrival_does_not_matter_and_the_same_stamp_replaces():
 
 def test_what_is_not_known_is_named_and_whether_it_may_come():
     joints = history()
-    with pytest.raises(NoJointStateError, match="no joint state has named turn, slide$"):
+    with pytest.raises(NoJointStateError, match="no joint state has contained turn, slide$"):
         joints.latest()
     joints.add(100, ["slide"], [1.0])
     for stamp, message, final in [
-        (100, "no joint state has named turn; the last one names slide", False),
+        (100, "no joint state has contained turn; the last one names slide", False),
         (50, "after the stamp 50 ns", True),
         (250, "the last position of turn, slide is of 200 ns, before the stamp 250 ns", False),
     ]:
