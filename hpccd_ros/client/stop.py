@@ -13,6 +13,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Bool
 
 from hpccd_ros.base.clocks import CLOCK_ERROR, Clocks, ClockWatch
+from hpccd_ros.base.quoting import counted
 from hpccd_ros.client.topics import STOP_TIMEOUT, STOP_TOPIC, stop_qos
 
 # Fraction of the time-out, the same in the node: silence reads as true before the time-out is over.
@@ -44,8 +45,9 @@ class StopListener:
         Number of publishers that must be alive on the topic. Give the true number: with a smaller one, a publisher that
         was never heard is not missed. A true from any of them within ``stop_timeout`` makes ``stop`` true.
     on_change : callable, optional
-        Called by the executor with this listener after ``stop`` changed: at messages and events at once, at a time-out
-        when a timer looks, four times in each; not at all while the executor stands still.
+        Called by the executor with this listener after ``stop`` changed, not when only the reason did: at messages and
+        events at once, at a time-out when a timer looks, four times in each; not at all while the executor stands
+        still.
     clock_error : float
         Largest difference between the system clocks of the two machines, in seconds.
 
@@ -88,7 +90,7 @@ class StopListener:
         self._value = True  # of that message
         self._sent_true = 0  # when the newest message with true was sent
         self._alive: int | None = None  # None: DDS has not told yet
-        self._lost = f"nothing was heard yet on {node.resolve_topic_name(topic)}"
+        self._lost = f"{node.resolve_topic_name(topic)}: no message yet"
         self._notified = True  # to on_change
         events = SubscriptionEventCallbacks(
             deadline=self._on_deadline, liveliness=self._on_liveliness, incompatible_qos=self._on_incompatible
@@ -107,12 +109,12 @@ class StopListener:
 
     @property
     def reason(self) -> str:
-        """Why ``stop`` is true, in a sentence; empty if it is false. /diagnostics has the cause that the node knows."""
+        """Why ``stop`` is true; empty if it is false. /diagnostics has the cause that the node knows."""
         return self._why() or ""
 
     def close(self) -> None:
         """End the subscription: ``stop`` is true from now on."""
-        self._lose("the listener was closed")
+        self._lose(f"{self._topic}: the listener was closed")
         self._node.destroy_timer(self._timer)
         self._node.destroy_subscription(self._subscription)
 
@@ -124,20 +126,23 @@ class StopListener:
                 self._sent, self._lost = None, clocks  # its age is unknown now
                 self._begun = 0
             if self._sent is None:
-                return f"{self._lost[0].upper()}{self._lost[1:]}."
+                return self._lost
             age = 1e-9 * (system - self._sent)
             if age < -self._clock_error:
-                return f"The last message on {self._topic} was sent {-age:.3g} s in the future."
+                return f"{self._topic}: the last message was sent {-age:.3g} s in the future"
             if age >= _IN_TIME * self._timeout:
-                return f"No message on {self._topic} was sent in the last {age:.3g} s."
+                return f"{self._topic}: no message was sent in the last {age:.3g} s"
             if self._alive is not None and self._alive < self._publishers:
-                return f"{self._alive} of {self._publishers} publishers are alive on {self._topic}."
+                return self._too_few(self._alive)
             if self._value:
                 return f"{self._topic} is true"
             several = max(self._publishers, self._alive or 0) > 1
             if several and 1e-9 * (system - self._sent_true) < self._timeout:
-                return f"One of several publishers said it on {self._topic}."
+                return f"{self._topic} is true from one of several publishers"
             return None
+
+    def _too_few(self, alive: int) -> str:
+        return f"{self._topic}: {alive} of {counted(self._publishers, 'publisher')} alive"
 
     def _on_message(self, message: Bool, info: dict[str, Any]) -> None:
         sent = info["source_timestamp"]  # 0, and so too old, if the middleware provides none
@@ -149,26 +154,26 @@ class StopListener:
             if message.data:
                 self._sent_true = max(self._sent_true, sent)
             if sent < self._begun:
-                self._lost = f"no message on {self._topic} was sent since the listener was made"
+                self._lost = f"{self._topic}: no message was sent since the listener was created"
             elif self._sent is None or sent >= self._sent or self._sent > system:
                 self._value, self._sent = message.data, sent
         self._notify()
 
     def _on_deadline(self, event: Any) -> None:
-        self._lose(f"nothing was heard on {self._topic} for {self._timeout:g} s")
+        self._lose(f"{self._topic}: no message for {self._timeout:g} s")
 
     def _on_liveliness(self, event: Any) -> None:
         with self._lock:
             self._alive = event.alive_count
         if event.alive_count < self._publishers:
-            self._lose(f"{event.alive_count} of {self._publishers} publishers are alive on {self._topic}")
+            self._lose(self._too_few(event.alive_count))
         else:
             self._notify()
 
     def _on_incompatible(self, event: Any) -> None:
         self._lose(
-            f"a publisher on {self._topic} promises less than is asked for: its stop_timeout is above "
-            f"{self._timeout:g} s, or it is not reliable and latched; give the listener that of the node"
+            f"{self._topic}: a publisher offers less than the listener requests: its stop_timeout is above "
+            f"{self._timeout:g} s, or it is not reliable and latched; give the listener the node's stop_timeout"
         )
 
     def _lose(self, why: str) -> None:

@@ -3,6 +3,7 @@
 
 from dataclasses import replace
 
+import hpccd_core as hc
 from hpccd_core.options import FEATURES
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.scene import SceneBuilder
@@ -20,6 +21,7 @@ class Nearness:
 
     def __init__(self, builder: SceneBuilder, options: Options, distance: float) -> None:
         self._detector = StepDetector(builder.between_meshes, _asking(options, distance))
+        self._names = [mesh.name for mesh in builder.meshes]
         self._static = [number for number, mesh in enumerate(builder.meshes) if mesh.static]
         self._apart: SceneFrame | None = None  # no edge intersects a face there
 
@@ -31,20 +33,28 @@ class Nearness:
         """Permanently: `within` raises hc.Cancelled. May be called from any thread."""
         self._detector.cancel()
 
-    def within(self, start: SceneFrame, end: SceneFrame) -> tuple[bool, float]:
-        """(whether a pair came within the distance, that distance). Raises the core's errors."""
+    def within(self, start: SceneFrame, end: SceneFrame) -> tuple[tuple[str, str] | None, float]:
+        """(the names of two meshes that came within the distance, that distance); None: none did. Of several pairs of
+        meshes any one. Raises the core's errors."""
         # A static mesh may have been placed elsewhere, without a motion.
         stays = all(start.vertices[mesh] is end.vertices[mesh] for mesh in self._static)
         apart, self._apart = stays and self._apart is start, None
         found = self._detector.detect(start, end)
-        near = len(found.contacts) > 0
+        near = self._meshes(found.contacts)
         # An edge through the middle of a large face may be far from its border and corners: the meshes intersect, and
         # no pair of features is within the distance. They get there only by a contact, so starts are tested.
-        if not near and not apart:
-            near = self._detector.intersect(end)
-        if not near:
+        if near is None and not apart:
+            near = self._meshes(self._detector.intersect(end))
+        if near is None:
             self._apart = end
         return near, found.options.separation.minimum
+
+    def _meshes(self, pairs: hc.Contacts | hc.Intersections) -> tuple[str, str] | None:
+        """The names of the meshes of the first pair."""
+        if not len(pairs):
+            return None
+        a, b = sorted((int(pairs.mesh_a[0]), int(pairs.mesh_b[0])))
+        return self._names[a], self._names[b]
 
 
 def _asking(options: Options, distance: float) -> Options:

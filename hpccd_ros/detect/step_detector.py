@@ -114,11 +114,11 @@ class StepDetector:
         self.prepare_detector()
         return self._detector.distances(self._builder.concatenate(frame, frame))
 
-    def intersect(self, frame: SceneFrame) -> bool:
-        """Whether an edge intersects or touches a face in ``frame``. Raises the core's errors."""
+    def intersect(self, frame: SceneFrame) -> hc.Intersections:
+        """The edges that intersect or touch faces in ``frame``. Raises the core's errors."""
         self.prepare_scene(frame)
         self.prepare_detector()
-        return len(self._detector.intersections(self._builder.concatenate(frame, frame))) > 0
+        return self._detector.intersections(self._builder.concatenate(frame, frame))
 
     def detect(self, start: SceneFrame, end: SceneFrame) -> Detection:
         """The contacts of the motion from ``start`` to ``end``, of the same scene. Raises the core's errors."""

@@ -115,8 +115,9 @@ class StopState:
         """A frame came that ends no step: nothing is known of the motion to it."""
         self._set_cause(Cause.UNANSWERED, "no step has a result since the stream, or a topology, restarted")
 
-    def answered(self, near: bool, distance: float, origins: Sequence[Origin]) -> None:
-        """The result of a step for this distance; origins: of the meshes at its end, in the order of the scene."""
+    def answered(self, near: tuple[str, str] | None, distance: float, origins: Sequence[Origin]) -> None:
+        """The result of a step for this distance. near: names of two meshes that came within it; None: none did.
+        origins: of the meshes at its end, in the order of the scene."""
         with self._condition:
             if not self._active:
                 return
@@ -132,7 +133,8 @@ class StopState:
             if not self._ages.why(self._clocks.steady()):  # otherwise it is unknown which of two messages is newer
                 self._doubts = {key: item for key, item in self._doubts.items() if not item.settled(by_name)}
         if near:
-            self._set_cause(Cause.NEAR, f"meshes came within {distance:g} of each other on the last step, or touched")
+            pair = " and ".join(near)
+            self._set_cause(Cause.NEAR, f"{pair} came within {distance:g} of each other on the last step, or touched")
             return
         with self._condition:
             if distance < self.distance or scene is not self._scene or not self._active:

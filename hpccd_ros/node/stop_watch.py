@@ -28,6 +28,8 @@ from hpccd_ros.params import robot_parameters
 REPEATS = 4
 LAST_WORD = 0.2  # s for readers to confirm it
 LOG_PERIOD = 1.0  # s
+# Causes that belong to a node at work; the others are faults, and warnings in the log.
+_EXPECTED = ("", Cause.INACTIVE, Cause.UNANSWERED, Cause.NEAR)
 
 
 class StopSignal:
@@ -41,7 +43,7 @@ class StopSignal:
         self._state = state
         self._period = timeout / REPEATS
         self._publisher = node.configured_publisher(Bool, topic_names.STOP, qos.stop(timeout))
-        self._log_after, self._logged = 0.0, ""
+        self._log_after, self._logged = 0.0, str(Cause.INACTIVE)
         self._thread = threading.Thread(target=self._run, name="stop", daemon=True)
         self._thread.start()
         node.when_unconfigured(self.close)
@@ -79,7 +81,8 @@ class StopSignal:
         if cause == self._logged or now < self._log_after or not self._node.context.ok():
             return
         self._log_after, self._logged = now + LOG_PERIOD, cause
-        self._node.get_logger().info(text)
+        logger = self._node.get_logger()
+        (logger.info if cause in _EXPECTED else logger.warning)(text)
 
 
 _WARNED = {Cause.NEAR: DiagnosticStatus.WARN, Cause.UNANSWERED: DiagnosticStatus.WARN}

@@ -281,7 +281,7 @@ def _cost(source: sources.Source, apart: bool) -> dict:
     near = 0
     for k, (start, end) in enumerate(zip(frames, frames[1:], strict=False)):
         began = time.perf_counter()
-        near += look.within(start, end)[0]
+        near += look.within(start, end)[0] is not None
         taken["look"].append(1e3 * (time.perf_counter() - began))
         taken["contacts"].append(detector.detect(start, end).detect_ms)
         if k % DISTANCES_EACH == 1:

@@ -33,7 +33,7 @@ def test_random_approaches(seed):
     nearness = Nearness(builder, OPTIONS, stop_scene.DISTANCE)
     frames = [f for _ in range(8) for f in stop_scene.trial(random)]
     made = [frame(*f) for f in frames]
-    found = [nearness.within(*step)[0] for step in zip(made, made[1:], strict=False)]
+    found = [nearness.within(*step)[0] is not None for step in zip(made, made[1:], strict=False)]
     truth = [stop_scene.near(*step) for step in zip(frames, frames[1:], strict=False)]
     assert found == truth and 8 < sum(truth) < len(truth) - 8
 
@@ -42,9 +42,9 @@ def test_exactly_the_distance_counts_and_may_change():
     builder, frame = scene((FACES, FACES))
     nearness = Nearness(builder, OPTIONS, 0.25)
     far, near = frame(hand(0.25 * (1 + 2**-52)), TABLE), frame(hand(0.25), TABLE)
-    assert nearness.within(far, far) == (False, 0.25) and nearness.within(far, near) == (True, 0.25)
+    assert nearness.within(far, far) == (None, 0.25) and nearness.within(far, near) == (MESHES, 0.25)
     nearness.set(OPTIONS, 0.125)
-    assert nearness.within(near, near) == (False, 0.125)
+    assert nearness.within(near, near) == (None, 0.125)
 
 
 NEEDLE = np.array([[0, 0, -6.0], [0, 0, 6.0], [0.01, 0, 6.0]])
@@ -55,9 +55,24 @@ def test_what_pierces_far_from_all_borders():
     builder, frame = scene((FACES, FACES))
     nearness = Nearness(builder, OPTIONS, 0.1)
     pierced, apart = frame(NEEDLE, TABLE), frame(NEEDLE + (0, 0, 7), TABLE)
-    assert [nearness.within(*step)[0] for step in ((pierced, pierced),) * 2] == [True, True]
-    assert [nearness.within(*step)[0] for step in ((pierced, apart), (apart, apart))] == [True, False]
+    assert [nearness.within(*step)[0] for step in ((pierced, pierced),) * 2] == [MESHES, MESHES]
+    assert [nearness.within(*step)[0] for step in ((pierced, apart), (apart, apart))] == [MESHES, None]
     assert nearness.within(apart, pierced)[0] and nearness.within(pierced, pierced)[0]
+
+
+def test_the_meshes_that_are_near_are_named():
+    """In the order of the scene, whichever of them has the vertex or the edge."""
+    names = ("sheet", "hand", "table")
+    builder, frame = scene((FACES, FACES, FACES), names=names)
+    nearness = Nearness(builder, OPTIONS, 0.1)
+    apart = hand(2.0), TABLE - (0, 0, 9), TABLE
+    for near, pair in (
+        (apart, None),
+        ((hand(0.05), *apart[1:]), ("sheet", "table")),
+        ((hand(2.0), hand(2.05), TABLE), ("sheet", "hand")),
+        ((TABLE - (0, 0, 20), NEEDLE, TABLE), ("hand", "table")),  # intersects far from all borders
+    ):
+        assert nearness.within(frame(*near), frame(*near))[0] == pair
 
 
 def test_a_static_mesh_that_is_put_elsewhere():

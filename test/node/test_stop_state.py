@@ -14,6 +14,7 @@ from hpccd_ros.node.stop_state import IN_TIME, Cause, StopState
 
 TIMEOUT = 10.0
 SECOND = 10**9
+PAIR = ("hand", "table")
 SCENE = WatchedScene(
     ("hand", "table", "arm/tip"), (True, False, True), {"joint_states": ("arm/tip",)}, by_transforms=("hand",)
 )
@@ -45,7 +46,7 @@ def state(times):
     return made
 
 
-def clear(state, near=False, distance=0.25, hand=None, table=1, tip=None, **origin):
+def clear(state, near=None, distance=0.25, hand=None, table=1, tip=None, **origin):
     """A step whose last messages were sent at these times; None: now."""
     now = state.times.now
     places = (now if hand is None else hand, table, now if tip is None else tip)
@@ -63,7 +64,7 @@ def test_false_only_after_an_answer(state):
     assert cause(state) is Cause.UNANSWERED
     clear(state)
     assert cause(state) is None
-    clear(state, near=True)
+    clear(state, near=PAIR)
     assert cause(state) is Cause.NEAR
     clear(state)
     assert cause(state) is None
@@ -177,9 +178,9 @@ def test_doubts_outlive_a_scene_that_is_made_anew(state):
     state.end()
     state.begin(WatchedScene(("hand", "table"), (True, False)))
     now = state.times.now
-    state.answered(False, 0.25, [Origin(now), Origin(1)])
+    state.answered(None, 0.25, [Origin(now), Origin(1)])
     assert cause(state) is Cause.REFUSED and "table" in state.why().text
-    state.answered(False, 0.25, [Origin(now), Origin(now + 1)])
+    state.answered(None, 0.25, [Origin(now), Origin(now + 1)])
     assert cause(state) is None, "the link is no more in the scene"
 
 
@@ -194,11 +195,11 @@ def test_doubts_of_what_moves_a_robot_outlive_other_links(state, links):
     for scene in ((), links):
         state.begin(WatchedScene(("hand", *scene), (True,) * (1 + len(scene)), {"joint_states": scene}))
         for _ in range(2):
-            state.answered(False, 0.25, [Origin(state.times.now), *[Origin(sent)] * len(scene)])
+            state.answered(None, 0.25, [Origin(state.times.now), *[Origin(sent)] * len(scene)])
             state.next(0.0)
         assert cause(state) is (Cause.REFUSED if scene else None)
     if links:
-        state.answered(False, 0.25, [Origin(state.times.now)] * (1 + len(links)))
+        state.answered(None, 0.25, [Origin(state.times.now)] * (1 + len(links)))
         assert cause(state) is None
 
 
@@ -364,7 +365,7 @@ def test_each_rise_is_said_however_short(state):
     later = state.times.steady + 1000
     clear(state)
     assert state.next(later) is None
-    clear(state, near=True)
+    clear(state, near=PAIR)
     clear(state)
     assert state.next(later).cause is Cause.NEAR
     assert state.next(later) is None
@@ -380,7 +381,7 @@ def test_it_wakes_by_itself_when_the_time_is_over():
     state = StopState(0.25, 0.3)
     state.begin(WatchedScene(("hand",), (True,)))
     sent, steady = time.time_ns(), time.monotonic()
-    state.answered(False, 0.25, [Origin(sent)])
+    state.answered(None, 0.25, [Origin(sent)])
     assert state.next(0.0) is None
     assert state.next(steady + 1000).cause in (Cause.SILENT, Cause.HELD_UP)
     assert time.time_ns() >= sent + 0.3 * IN_TIME * SECOND
