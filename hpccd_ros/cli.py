@@ -14,7 +14,7 @@ from hpccd_ros.base.errors import UserError
 
 COMMANDS = {
     "demo": "see it work: node, moving scene and recorder as separate processes, then a picture",
-    "status": "ask a running node how it is: state, rates, what was rejected, what is wrong",
+    "status": "show the state of a running node: rates, what was rejected, what is wrong",
     "echo": "print the messages of a topic",
     "param": "read and set the parameters of a running node",
     "record": "record the meshes and contacts of a running node into an MCAP file",

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ask a running node how it is: its life-cycle state, what each mesh receives and when, how fast it answers, what was
-rejected last and why, whether stop is true, and, in words, what is wrong and how to fix it.
+"""Show the state of a running node: its life-cycle state, what each mesh receives and when, the rate of results, what
+was rejected last and why, whether stop is true, and, in words, what is wrong and how to fix it.
 
   hpccd status                  every hpccd node on this ROS_DOMAIN_ID
   hpccd status /arm/hpccd       this one

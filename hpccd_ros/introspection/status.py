@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`hpccd status`: what a node receives, answers and lacks, from its life-cycle service, parameters and diagnostics."""
+"""`hpccd status`: what a node receives, computes and lacks, from its life-cycle service, parameters and diagnostics."""
 
 import json
 import time
@@ -21,6 +21,8 @@ _REMEDIES = {
     "unconfigured": "configure and activate it, or start it with autostart: true",
     "inactive": "activate it, or start it with autostart: true",
 }
+# For frames that were dropped without another cause.
+_REASONS = "; docs/troubleshooting.md has the meaning of each reason"
 # Why stop is true although all is well with the node.
 _WORKING = ("", "near")
 
@@ -97,12 +99,13 @@ def _summary(statuses: dict[str, Status], parameters: dict[str, Any]) -> dict[st
             robot: {
                 "links": len(mine := [link for link in links if link.startswith(f"{robot}/")]),
                 **_of_mesh(frames, mine[0] if mine else ""),
-                "last_stamp_ns": _stamp(frames, parameters.get(f"robot.{robot}.joint_states") or ""),
+                "last_stamp_ns": _stamp(frames, topic := parameters.get(f"robot.{robot}.joint_states") or ""),
+                "joint_states": topic,
             }
             for robot in robots
         },
-        "answers_hz": float(detection.get("rate_hz", 0)),
-        "answers": int(detection.get("detections", 0)),
+        "results_hz": float(detection.get("rate_hz", 0)),
+        "results": int(detection.get("detections", 0)),
         "latency_ms": {
             name: float(detection[key]) for name in ("p50", "p99") if (key := f"latency_ms.{name}") in detection
         },
@@ -141,32 +144,30 @@ def _wrong(state: str, statuses: dict[str, Status], wait: float) -> list[str]:
             f"no diagnostics within {wait:g} s; wait longer (--wait) where the parameter diagnostics_period is longer, "
             "or start the node again if it does not respond"
         ]
-    wrong = []
+    wrong, stop = [], ""
     for part, (level, message, values) in statuses.items():
         warnings = [value for key, value in values.items() if key.startswith("warning.")]
         if part == "frames" and warnings:
             wrong += warnings
-        elif part == "stop" and values["cause"] in _WORKING:
-            continue
+        elif part == "stop":
+            stop = "" if values["cause"] in _WORKING else f"stop is {message}"
         elif level in (DiagnosticStatus.WARN, DiagnosticStatus.ERROR):
-            wrong.append(f"{part} is {message}" if part == "stop" else f"{part}: {message}")
-    return wrong
+            wrong.append(f"{part}: {message}{_REASONS if part == 'frames' else ''}")
+    # Of no use beside its own cause: stop has a line already.
+    return wrong or ([stop] if stop else [])
 
 
 def _lines(found: dict[str, Any]) -> list[str]:
     lines = [f"{found['node']}: {found['state']}"]
     inputs = [(name, _input_line(mesh)) for name, mesh in found["meshes"].items()]
-    inputs += [
-        (name, f"robot of {counted(robot['links'], 'link')}, {_input_line(robot)}")
-        for name, robot in found["robots"].items()
-    ]
+    inputs += [(name, _robot_line(robot)) for name, robot in found["robots"].items()]
     width = max((len(name) for name, _ in inputs), default=0)
     lines += [f"  {name:{width}}  {text}" for name, text in inputs]
     if not inputs:
-        lines.append("  no meshes: the node answers requests to ~/detect only")
+        lines.append("  no meshes: the node serves requests to ~/detect only")
     latency = found["latency_ms"]
     of_latency = f"; latency {latency['p50']:g} ms (median), {latency['p99']:g} ms (99 %)" if latency else ""
-    lines.append(f"  answers: {found['answers_hz']:g} a second, {found['answers']:,} in all{of_latency}")
+    lines.append(f"  results: {found['results_hz']:g} a second, {found['results']:,} in all{of_latency}")
     reasons = ", ".join(f"{reason} {count:,}" for reason, count in found["dropped_by_reason"].items())
     lines.append(f"  dropped: {counted(found['dropped'], 'message')}{f' ({reasons})' if reasons else ''}")
     if found["last_rejection"]:
@@ -176,11 +177,26 @@ def _lines(found: dict[str, Any]) -> list[str]:
     return lines + ([f"  wrong: {text}" for text in found["wrong"]] or ["  nothing is wrong"])
 
 
+def _robot_line(of: dict[str, Any]) -> str:
+    if of["links"]:
+        return f"robot of {counted(of['links'], 'link')}, {_input_line(of)}"
+    stamp = of["last_stamp_ns"]
+    if not of["joint_states"]:
+        return "robot moved by TF, no frame yet"
+    return (
+        f"robot, no frame yet, {'no joint state received' if stamp is None else f'last joint state {_seconds(stamp)}'}"
+    )
+
+
+def _seconds(stamp: int) -> str:
+    return f"{stamp // 10**9}.{stamp % 10**9:09d} s"
+
+
 def _input_line(of: dict[str, Any]) -> str:
     if not of["received"]:
         return "static, no message received" if of.get("static") else "no message received"
     stamp = of["last_stamp_ns"]
-    last = "" if stamp is None else f", last stamp {stamp // 10**9}.{stamp % 10**9:09d} s"
+    last = "" if stamp is None else f", last stamp {_seconds(stamp)}"
     rate = "static" if of.get("static") else f"{of['rate_hz']:g} Hz"
     return f"{rate}{last}, {counted(of['received'], 'message')} received"
 

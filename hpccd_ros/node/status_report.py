@@ -9,7 +9,8 @@ from pathlib import Path
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from hpccd_ros.base.quoting import counted
+from hpccd_ros.base.quoting import counted, listed
+from hpccd_ros.frames.drops import Reason
 from hpccd_ros.middleware import topic_names
 from hpccd_ros.node.accounts import REFUSED_BESIDE_MESHES, Accounts
 from hpccd_ros.node.metrics import percentiles
@@ -25,7 +26,7 @@ class Reporter:
         self._received: dict[str, int] = {}
         self._detections = 0
         self._coarse = 0
-        self._dropped = 0
+        self._dropped: dict[Reason, int] = {}
         self._topologies_refused = 0
         self._refused_beside = dict.fromkeys(REFUSED_BESIDE_MESHES, 0)
 
@@ -77,8 +78,8 @@ class Reporter:
         coordinate_frame: tuple[str, str],
     ) -> DiagnosticStatus:
         accounts = self._accounts
-        dropped, topologies_refused = accounts.dropped.total, accounts.topologies_refused.total
-        new = dropped - self._dropped
+        dropped, topologies_refused = accounts.dropped.by_reason(), accounts.topologies_refused.total
+        new = {reason: more for reason, count in dropped.items() if (more := count - self._dropped.get(reason, 0))}
         new_topologies = topologies_refused - self._topologies_refused
         values: dict[str, object] = {}
         for mesh, count in sorted(data["received"].items()):
@@ -90,13 +91,13 @@ class Reporter:
             "received": sum(data["received"].values()),
             "answered": data["answered"],
             "waiting": waiting,
-            "dropped": dropped,
+            "dropped": sum(dropped.values()),
             "restarts": accounts.restarts,
             "topologies_refused": topologies_refused,
             "frame_id": coordinate_frame[0],
             "frame_id_by": coordinate_frame[1],
         }
-        for reason, count in sorted(accounts.dropped.by_reason().items()):
+        for reason, count in sorted(dropped.items()):
             values[f"dropped.{reason}"] = count
         for (mesh, reason), count in sorted(accounts.dropped.by_mesh_and_reason().items()):
             values[f"dropped.{mesh}.{reason}"] = count
@@ -110,13 +111,14 @@ class Reporter:
         self._received, self._dropped, self._topologies_refused = (data["received"], dropped, topologies_refused)
         notes = list(warnings)
         if new:
-            notes.insert(0, f"{counted(new, 'frame')} dropped")
+            reasons = listed(f"{reason} {count:,}" for reason, count in sorted(new.items()))
+            notes.insert(0, f"{counted(sum(new.values()), 'frame')} dropped ({reasons})")
         if new_topologies:
-            notes.insert(0, f"{counted(new_topologies, 'topology', 'topologies')} refused")
+            notes.insert(0, f"{counted(new_topologies, 'topology', 'topologies')} rejected")
         for what, name in REFUSED_BESIDE_MESHES.items():
             before, self._refused_beside[what] = self._refused_beside[what], accounts.connections[name]
             if new_of_kind := self._refused_beside[what] - before:
-                notes.insert(0, f"{counted(new_of_kind, what.removesuffix('s'))} refused")
+                notes.insert(0, f"{counted(new_of_kind, what.removesuffix('s'))} rejected")
         if notes or (silent and came):
             return self._status("frames", DiagnosticStatus.WARN, "; ".join([*notes, *silent]), values)
         if not came:

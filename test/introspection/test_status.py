@@ -5,9 +5,15 @@ import json
 import os
 
 import pytest
+from sensor_msgs.msg import JointState
 from waving_sheet import sheet_faces, sheet_positions
 
+from hpccd_ros.middleware import fields
+
 N = 8
+URDF = """<robot name="arm"><link name="base"/>
+<link name="upper"><collision><geometry><box size="1 1 1"/></geometry></collision></link>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/></joint></robot>"""
 
 
 @pytest.fixture
@@ -23,7 +29,7 @@ def of(done):
     return found
 
 
-def test_a_node_that_answers(start_node, hpccd):
+def test_a_node_with_results(start_node, hpccd):
     node = start_node({"meshes": ["cloth", "floor"], "mesh.floor.static": True, "stop_distance": 0.0})
     for mesh in ("cloth", "floor"):
         node.peer.topology(mesh, sheet_faces(N), N * N)
@@ -40,10 +46,10 @@ def test_a_node_that_answers(start_node, hpccd):
         line.startswith("  cloth  ") and "last stamp 1.500000002 s, 3 messages received" in line for line in lines
     ), shown.stdout
     assert any(line.startswith("  floor  static, last stamp 0.000000000 s, 1 message received") for line in lines)
-    assert any(line.startswith("  answers: ") and " 2 in all; latency " in line for line in lines)
+    assert any(line.startswith("  results: ") and " 2 in all; latency " in line for line in lines)
     assert any(line.startswith("  stop: ") for line in lines)
     found = of(hpccd("status", name, "--json"))
-    assert (found["state"], found["answers"], found["dropped"]) == ("active", 2, 0)
+    assert (found["state"], found["results"], found["dropped"]) == ("active", 2, 0)
     assert found["meshes"]["cloth"]["last_stamp_ns"] == 1_500_000_002
     assert found["meshes"]["floor"]["static"] and found["stop"]["text"].startswith(("true: ", "false: "))
 
@@ -83,3 +89,33 @@ def test_a_wrong_name_of_a_node(start_node, hpccd):
     assert done.returncode == 2
     assert f"no node {node.namespace}/hpcd found on ROS_DOMAIN_ID {os.environ['ROS_DOMAIN_ID']}" in done.stderr
     assert f"did you mean {node.namespace}/hpccd?" in done.stderr
+
+
+def test_a_robot_without_a_frame(start_node, hpccd, tmp_path):
+    """Joint states come and name no joint of the robot: they are not missing."""
+    file = tmp_path / "arm.urdf"
+    file.write_text(URDF)
+    node = start_node(
+        {
+            "robots": ["arm", "tool"],
+            "frame_id": "world",
+            "robot.arm.description": str(file),
+            "robot.arm.joint_states": "joint_states",
+            "robot.tool.description": str(file),
+        }
+    )
+    name = f"{node.namespace}/hpccd"
+    shown = hpccd("status", name).stdout
+    assert "  arm   robot, no frame yet, no joint state received\n" in shown
+    assert "  tool  robot moved by TF, no frame yet\n" in shown
+    message = JointState(name=["left_shoulder"], position=[0.1])
+    message.header.stamp = fields.ns_to_stamp(7 * 10**9)
+    publisher = node.peer.node.create_publisher(JointState, "joint_states", 5)
+
+    def received():
+        publisher.publish(message)
+        return "last_stamp.joint_states" in node.peer.statuses["frames"][2]
+
+    node.wait_until(received, "the message")
+    shown = hpccd("status", name).stdout
+    assert "  arm   robot, no frame yet, last joint state 7.000000000 s\n" in shown

@@ -58,7 +58,11 @@ def test_drops_warn_once_and_stay_counted():
     node.accounts.refused(Refusal("ball", Reason.NOT_FINITE, "vertex 1 is nan"))
     node.accounts.refused(Refusal("ball", Reason.OLD_TOPOLOGY, "version 1", what=Input.TOPOLOGY))
     level, text, values = node.report()["/hpccd: frames"]
-    assert level == DiagnosticStatus.WARN and "5 frames dropped" in text and "1 topology refused" in text
+    assert (
+        level == DiagnosticStatus.WARN
+        and "5 frames dropped (not_finite 1, overload 4)" in text
+        and "1 topology rejected" in text
+    )
     assert values["dropped"] == "5" and values["dropped.overload"] == "4"
     assert values["dropped.ball.not_finite"] == "1" and values["topologies_refused.ball.old_topology"] == "1"
     assert values["last_refusal"] == "ball: old_topology: version 1"
@@ -71,7 +75,7 @@ def test_what_moves_meshes_is_told_of_where_it_is_refused():
     for what, key in ((Input.JOINT_STATE, "joint_states_refused"), (Input.TRANSFORM, "transforms_refused")):
         node.accounts.refused(Refusal("topic", Reason.MALFORMED, "stamp has sec -1", what=what))
         level, text, values = node.report()["/hpccd: frames"]
-        assert level == DiagnosticStatus.WARN and f"1 {what.removesuffix('s')} refused" in text
+        assert level == DiagnosticStatus.WARN and f"1 {what.removesuffix('s')} rejected" in text
         assert (values[key], values["dropped"]) == ("1", "0")
         assert values["last_refusal"] == "topic: malformed: stamp has sec -1"
         level, text, values = node.report()["/hpccd: frames"]
@@ -109,7 +113,7 @@ def test_silent_inputs_are_named_and_stay_stale_while_nothing_comes():
 def test_one_and_many():
     node = Fixture()
     node.accounts.refused(Refusal("cloth", Reason.OVERLOAD))
-    assert node.report()["/hpccd: frames"][1] == "1 frame dropped"
+    assert node.report()["/hpccd: frames"][1] == "1 frame dropped (overload 1)"
     assert node.report(errors=(1, "x"))["/hpccd: errors"][1] == "1 unexpected error, the last: x"
 
 
