@@ -24,6 +24,7 @@ _NO_LOG_FILE = "--disable-external-lib-logs"
 # Errors of rclpy's C++ part, whose classes are not in its public interface.
 _OF_RCL = ("RCLError", "NodeError", "UnknownROSArgsError")
 _REMEDIES = {
+    "Sequence should be of same type": "the entries of a list need one type: write 0.0, not 0, beside 0.5",
     "params file": "a parameter file is YAML as config/hpccd.yaml: node name or /**, ros__parameters, names and values",
     "remap rule": "write -r FROM:=TO",
     "parameter override rule": "write -p NAME:=VALUE, and texts with a colon in quotes: -p NAME:=\"['a:b']\"",

@@ -33,13 +33,16 @@ class Configuration:
         self._node = node
         parameters.check_command_line(node, sys.argv)
         self.settings, self.meshes = parameters.declare(node)
+        # Before the values: a misspelt name often leaves another parameter without its value.
+        foreign = unknown.check(parameters.unknown_overrides(node), self.settings)
         scene_parameters.check(self.settings, self.meshes)
         topics = topic_names.subscribed(self.meshes, robot_parameters.subscribed(self.settings[ROBOT]))
         if why := self._unusable_topics(self.settings, self.meshes) or qos_overrides.unusable_override(node):
             raise ParameterError(why)
-        not_ours = parameters.unknown_overrides(node, qos_overrides.known(node, topics))
-        for name in unknown.check(not_ours, self.settings):
-            node.get_logger().warning(unknown.warning(name))
+        of_topics = qos_overrides.known(node, topics)  # declared only when their topics are there
+        for name in foreign:
+            if name not in of_topics:
+                node.get_logger().warning(unknown.warning(name))
         self.warnings = parameters.files_without_section(node, sys.argv)
         for warning in self.warnings:
             node.get_logger().warning(warning)

@@ -3,7 +3,7 @@
 
 import copy
 import itertools
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, ParameterType, SetParametersResult
@@ -105,12 +105,9 @@ def _declare_one(node: Node, row: Row, name: str) -> Any:
     return usable(row, name, value)
 
 
-def unknown_overrides(node: Node, qos_overrides: Container[str] = ()) -> list[str]:
-    """Parameters given on the command line or in a file that the node does not have.
-
-    qos_overrides: names of those that are declared only when their topics are there.
-    """
-    return sorted(name for name in _given(node) if not node.has_parameter(name) and name not in qos_overrides)
+def unknown_overrides(node: Node) -> list[str]:
+    """Parameters given on the command line or in a file that the node does not have."""
+    return sorted(name for name in _given(node) if not node.has_parameter(name))
 
 
 def check_command_line(node: Node, arguments: list[str]) -> None:

@@ -150,7 +150,7 @@ ARGUMENTS = {
     "long-remapping-of-service": (["-r", f"~/detect:=/{'a' * 300}"], 2, "~/detect: "),
     "long-namespace": (["-r", f"__ns:=/{'a' * 230}"], 2, "give another namespace"),
     "parameter": (["-p", "threads"], 2, "write -p NAME:=VALUE"),
-    "parameter-of-lists": (["-p", "threads:=[1,a]"], 2, "write -p NAME:=VALUE"),
+    "parameter-of-lists": (["-p", "threads:=[1,a]"], 2, "the entries of a list need one type"),
     "parameter-with-colons": (["-p", "pair_separation:=[a:b:1]"], 2, """in quotes: -p NAME:="['a:b']\""""),
     "unknown-argument": (["--nonsense"], 2, "unknown ROS arguments ['--nonsense']"),
     "log-level": (["--log-level", "nonsense"], 2, "Couldn't parse log level"),

@@ -67,6 +67,10 @@ REJECTED = {
         "robot.arm.joint_state: no such parameter of a robot; there are description, geometry, srdf, joint_states, "
         "frame_prefix, pose, tolerance; did you mean joint_states?",
     ),
+    "key-of-a-robot-that-is-needed": (
+        {"robots": ["arm"], "robot.arm.joint_state": "joint_states", "robot.arm.pose": [0.0] * 6 + [1.0]},
+        "robot.arm.joint_state: no such parameter of a robot",
+    ),
     "robot-not-listed": (
         CLOTH | {"robot.arm.joint_states": "joint_states"},
         "robot.arm.joint_states: arm is not in the parameter robots (which is empty); add it there",
@@ -130,6 +134,11 @@ ARGUMENTS = {
         ["--params-file", "a.yaml"],
         2,
         "ROS arguments come after --ros-args, for example --ros-args --p",
+    ),
+    "numbers-of-two-types": (
+        ["--ros-args", "-p", "mesh.cloth.pose:=[0, 0, 1.5, 0, 0, 0, 1]"],
+        2,
+        "the entries of a list need one type: write 0.0, not 0, beside 0.5",
     ),
     "no-file": (["--ros-args", "--params-file", "/nowhere/a.yaml"], 2, "a parameter file is YAML as config/hpccd.yaml"),
     "equals-sign": (["--ros-args", "-p", "accuracy=fast"], 2, "write -p NAME:=VALUE"),
