@@ -132,7 +132,7 @@ class StagedData(install_data):
 
 
 class NoEditable(Command):
-    """Refuse `pip install -e`: it would report success and leave the generated messages out."""
+    """Reject `pip install -e`: it would report success and leave the generated messages out."""
 
     user_options = [("dist-dir=", "d", ""), ("dist-info-dir=", "I", "")]
 

@@ -411,7 +411,7 @@ def _no_array(name: str, value: object, error: Exception) -> TypeError:
     return TypeError(f"{name}: {kind} cannot be converted to an array ({error}); give an array of numbers")
 
 
-def refuse_masked(name: str, value: object) -> None:
+def reject_masked(name: str, value: object) -> None:
     """A masked array with nothing masked is as good as any; of others the mask would be lost."""
     _kinds(name, value)
 

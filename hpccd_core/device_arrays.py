@@ -54,7 +54,7 @@ def is_on_device(value: object) -> bool:
     device = getattr(value, "__dlpack_device__", None)
     try:
         return device is not None and int(device()[0]) == 2  # kDLCUDA
-    except Exception:  # a class, a PyTorch tensor without memory: refused by name as an array on the host
+    except Exception:  # a class, a PyTorch tensor without memory: rejected by name as an array on the host
         return False
 
 

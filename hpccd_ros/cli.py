@@ -118,8 +118,8 @@ def _ros_start_failure(error) -> str | None:
         return None  # not of ROS; most commands need none
     from hpccd_ros.middleware import ros_start
 
-    refused = ros_start.start_failure(error)
-    return refused and refused[1]
+    rejected = ros_start.start_failure(error)
+    return rejected and rejected[1]
 
 
 if __name__ == "__main__":

@@ -64,8 +64,8 @@ def run(args) -> Report:
     asked = [a for a in choice.ASKED if a.name in names]
     tiers = command.listed("--tiers", args.tiers, ACCURACIES)
     which = args.backend or (",".join(measure.BACKENDS) if bounds else "cpu")
-    backends, refused = command.usable("backend", which, measure.BACKENDS)
-    sets, refused_sets = command.usable("simd", args.simd, SIMD)
+    backends, rejected = command.usable("backend", which, measure.BACKENDS)
+    sets, rejected_sets = command.usable("simd", args.simd, SIMD)
     if args.picture is not None:
         if Path(args.picture).suffix not in (".png", ".pdf", ".svg"):
             raise UserError(f"--picture {args.picture}: name a .png, .pdf or .svg file")
@@ -73,8 +73,8 @@ def run(args) -> Report:
     report, found = command.begin(args)
     report.note(measure.NOTE)
     if args.backend:
-        command.skipped(report, "backend", refused)
-    command.skipped(report, "instruction set", refused_sets)
+        command.skipped(report, "backend", rejected)
+    command.skipped(report, "instruction set", rejected_sets)
     for source in found:
         variants = {
             (backend, simd, tier, what.name): what

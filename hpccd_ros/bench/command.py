@@ -69,10 +69,10 @@ def listed(option: str, text: str, choices: Sequence[str]) -> list[str]:
 
 def usable(name: str, text: str, choices: Sequence[str], **others) -> tuple[list[str], dict[str, str]]:
     """The values of --NAME that work here, and why the others do not; UserError if none does."""
-    found, refused = measure.usable(name, listed(f"--{name}", text, choices), **others)
+    found, rejected = measure.usable(name, listed(f"--{name}", text, choices), **others)
     if not found:
         raise UserError(f"--{name} {text}: none of these works here; see `hpccd info`")
-    return found, refused
+    return found, rejected
 
 
 def begin(args, resolve: Callable = sources.resolve) -> tuple[Report, list[sources.Source]]:
@@ -130,6 +130,6 @@ def require_writable(option: str, path: Path) -> None:
         raise UserError(f"{option}: {path} cannot be written ({error.strerror}); name another") from error
 
 
-def skipped(report: Report, what: str, refused: dict[str, str]) -> None:
-    for value, why in refused.items():
+def skipped(report: Report, what: str, rejected: dict[str, str]) -> None:
+    for value, why in rejected.items():
         report.note(f"{what} {value} skipped: {why}")

@@ -30,10 +30,10 @@ def configure(parser):
 
 def run(args) -> Report:
     modes = command.listed("--report", args.report, ("all", "first", "any"))
-    backends, refused = command.usable("backend", args.backend, measure.BACKENDS, accuracy=args.accuracy)
+    backends, rejected = command.usable("backend", args.backend, measure.BACKENDS, accuracy=args.accuracy)
     report, found = command.begin(args)
     report.note(measure.NOTE)
-    command.skipped(report, "backend", refused)
+    command.skipped(report, "backend", rejected)
     options, threads = {"accuracy": args.accuracy, "threads": args.threads}, args.threads or cores()
     asked = {f"{backend} {mode}": {"backend": backend, "report": mode} for backend in backends for mode in modes}
     for source in found:

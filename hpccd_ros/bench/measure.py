@@ -64,8 +64,8 @@ def bar(description: str, total: int) -> Iterator[Callable[[], None]]:
 
 def usable(name: str, values: Sequence[str], **others) -> tuple[list[str], dict[str, str]]:
     """Those `values` of the option `name` that work here, and {value: reason} of the others."""
-    refused = {value: _why_unusable(**{name: value}, **others) for value in values}
-    return [v for v in values if refused[v] is None], {v: why for v, why in refused.items() if why is not None}
+    rejected = {value: _why_unusable(**{name: value}, **others) for value in values}
+    return [v for v in values if rejected[v] is None], {v: why for v, why in rejected.items() if why is not None}
 
 
 def _why_unusable(**given) -> str | None:

@@ -112,7 +112,7 @@ def vertices_message(
     >>> message.header.stamp.sec, message.header.stamp.nanosec
     (2, 500000000)
     """
-    arguments.refuse_masked("vertices", vertices)
+    arguments.reject_masked("vertices", vertices)
     if not isinstance(vertices, np.ndarray) or vertices.dtype not in arguments.REALS:
         kind = f"dtype {vertices.dtype}" if isinstance(vertices, np.ndarray) else type(vertices).__name__
         raise TypeError(f"vertices: expected an array of float32 or float64, got {kind}; convert with numpy.asarray")

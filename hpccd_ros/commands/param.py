@@ -9,7 +9,7 @@
   hpccd param set pair_separation "['robot:cloth:0.01']"
   hpccd param set stop_distance 0.05 --node /arm/hpccd
 
-A value that the node refuses is not set, and the reason is shown (exit status 2). docs/parameters.md lists all
+A value that the node rejects is not set, and the reason is shown (exit status 2). docs/parameters.md lists all
 parameters and when each can change.
 """
 

@@ -28,10 +28,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hpccd_ros.base.quoting import listed
-from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Input, Reason, Rejection
 from hpccd_ros.frames.matching import ExactMatcher, Match, Matcher, NearestMatcher
 from hpccd_ros.frames.restart import CoordinateFrame, Restart, StampOrder
-from hpccd_ros.frames.topology_version import TopologyHistory, check_frame, check_successor, is_early, refused_topology
+from hpccd_ros.frames.topology_version import TopologyHistory, check_frame, check_successor, is_early, rejected_topology
 from hpccd_ros.frames.types import (
     OUTDATED,
     AssemblyRules,
@@ -122,13 +122,13 @@ class FrameAssembler:
             return self._unknown(mesh, Input.TOPOLOGY)
         if state.whole:
             text = f"the topology comes with the positions (parameter mesh.{mesh}.input); publish no other one"
-            return Outcome(refusals=[refused_topology(mesh, Reason.TOPOLOGY_CONFLICT, text, topology)])
+            return Outcome(rejections=[rejected_topology(mesh, Reason.TOPOLOGY_CONFLICT, text, topology)])
         current = state.topologies.current
         if current is not None and topology.version == current.version and topology.same_content(current):
             state.topologies.sent = topology.sent
             return Outcome()
-        if current is not None and not new_publisher and (refusal := check_successor(mesh, topology, current)):
-            return Outcome(refusals=[refusal])
+        if current is not None and not new_publisher and (rejection := check_successor(mesh, topology, current)):
+            return Outcome(rejections=[rejection])
         state.topologies.put(topology)
         placed = state.positions.last_sent
         state.positions.clear()
@@ -164,33 +164,33 @@ class FrameAssembler:
             outcome += self.add(name, frame)
         return outcome
 
-    def clear(self, reason: Reason) -> list[Refusal]:
+    def clear(self, reason: Reason) -> list[Rejection]:
         """Discard all frames, but not topologies and static positions. Waiting messages are dropped for ``reason``."""
-        refusals = self._matcher.clear(reason)
+        rejections = self._matcher.clear(reason)
         for state in self._meshes.values():
-            refusals += [Refusal(state.name, reason) for _ in state.early]
+            rejections += [Rejection(state.name, reason) for _ in state.early]
             state.early.clear()
             state.stamps.reset()
         self._frame.reset()
-        return refusals
+        return rejections
 
     def _unknown(self, mesh: str, what: Input) -> Outcome:
         text = f"no such mesh; parameter meshes has {listed(self._meshes)}"
-        return Outcome(refusals=[Refusal(mesh, Reason.UNKNOWN_MESH, text, what=what)])
+        return Outcome(rejections=[Rejection(mesh, Reason.UNKNOWN_MESH, text, what=what)])
 
     def _admit(self, state: _MeshState, frame: MeshFrame) -> Outcome:
         if frame.topology is not None:
             topology = state.topologies.same_as(frame.topology)
         elif is_early(frame, state.topologies.current):
-            return Outcome(refusals=self._hold(state, frame))
+            return Outcome(rejections=self._hold(state, frame))
         else:
             topology = state.topologies.current if state.static else state.topologies.of(frame)
-        if refusal := check_frame(state.name, frame, topology):
-            return Outcome(refusals=[refusal])
+        if rejection := check_frame(state.name, frame, topology):
+            return Outcome(rejections=[rejection])
         frame = frame.of_topology(topology)
         return self._keep_positions(state, frame) if state.static else self._join(state, frame)
 
-    def _hold(self, state: _MeshState, frame: MeshFrame) -> list[Refusal]:
+    def _hold(self, state: _MeshState, frame: MeshFrame) -> list[Rejection]:
         state.early.append(frame)
         if len(state.early) <= self._max_early:
             return []
@@ -200,11 +200,11 @@ class FrameAssembler:
             f"topology{version} has not arrived; publish it on "
             f"meshes/{state.name}/topology (reliable, transient local) before the vertices"
         )
-        return [Refusal(state.name, Reason.NO_TOPOLOGY, text, sent=lost.sent)]
+        return [Rejection(state.name, Reason.NO_TOPOLOGY, text, sent=lost.sent)]
 
     def _keep_positions(self, state: _MeshState, frame: MeshFrame) -> Outcome:
-        if refusal := self._frame.check_static(state.name, frame):
-            return Outcome(refusals=[refusal])
+        if rejection := self._frame.check_static(state.name, frame):
+            return Outcome(rejections=[rejection])
         if state.topologies.accept(frame):
             state.positions.clear()
         state.positions.keep(frame)
@@ -215,35 +215,35 @@ class FrameAssembler:
         outcome = Outcome()
         for check in (self._check_frame_id,) if state.follows else (self._check_frame_id, self._check_stamp):
             verdict = check(state, frame)
-            if isinstance(verdict, Refusal):
-                outcome.refusals.append(replace(verdict, sent=frame.sent))
+            if isinstance(verdict, Rejection):
+                outcome.rejections.append(replace(verdict, sent=frame.sent))
                 return outcome
             if isinstance(verdict, Restart):
                 outcome.restarts.append(f"{verdict.text}: taken as a restart")
-                outcome.refusals += self.clear(Reason.RESTART)
+                outcome.rejections += self.clear(Reason.RESTART)
         self._frame.adopt(state.name, frame.frame_id)
         state.stamps.accept(frame.stamp)
         state.topologies.accept(frame)
         state.new_publisher = False
         outcome.joined.append((state.name, frame.stamp, frame.received))
-        matches, refusals = self._matcher.add(state.name, frame)
-        outcome.refusals += refusals
+        matches, rejections = self._matcher.add(state.name, frame)
+        outcome.rejections += rejections
         for match in matches:
             completed = self._complete(match)
             if isinstance(completed, SceneFrame):
                 outcome.frames.append(completed)
             else:
-                outcome.refusals += completed
+                outcome.rejections += completed
         return outcome
 
-    def _check_frame_id(self, state: _MeshState, frame: MeshFrame) -> Refusal | Restart | None:
+    def _check_frame_id(self, state: _MeshState, frame: MeshFrame) -> Rejection | Restart | None:
         new_and_alone = state.new_publisher and frame.only_publisher
         return self._frame.check(state.name, frame, self.restart_after, new_and_alone)
 
-    def _check_stamp(self, state: _MeshState, frame: MeshFrame) -> Refusal | Restart | None:
+    def _check_stamp(self, state: _MeshState, frame: MeshFrame) -> Rejection | Restart | None:
         return state.stamps.check(frame.stamp, self.restart_after, state.new_publisher)
 
-    def _complete(self, match: Match) -> SceneFrame | list[Refusal]:
+    def _complete(self, match: Match) -> SceneFrame | list[Rejection]:
         frames = []
         origins = []
         frame_id = self._frame.name
@@ -257,7 +257,7 @@ class FrameAssembler:
             else:
                 text = _no_positions(state, frame_id)
                 missing = Reason.STATIC_MISSING
-                return [Refusal(fresh, missing, text, aspect=Aspect.NOTHING) for fresh in match.fresh]
+                return [Rejection(fresh, missing, text, aspect=Aspect.NOTHING) for fresh in match.fresh]
             frames.append(frame)
             origins.append(Origin(place, frame.shape_sent, state.topologies.sent_of(frame.topology)))
             frame_id = frame_id or frame.frame_id

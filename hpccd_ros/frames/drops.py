@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reasons for which messages are not used, and their counters.
 
-Code that drops a message returns a `Refusal` to its caller; counters at the end add them up. The unit is one vertex
+Code that drops a message returns a `Rejection` to its caller; counters at the end add them up. The unit is one vertex
 message of one mesh, so that the counts add up:
 received + lost in the middleware = answered + dropped + still waiting.
 """
@@ -67,7 +67,7 @@ class Aspect(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class Rejection:
     """``messages`` of ``mesh`` (of a transform: its topic) that are not used, and why.
 
     ``text``: the problem and the remedy, for the log; "": there is no remedy. ``sent``: when the message was sent, ns
@@ -83,7 +83,7 @@ class Refusal:
     sent: int | None = None
 
 
-class RefusalCounter:
+class RejectionCounter:
     """Counts by mesh and reason; may be used from several threads."""
 
     def __init__(self) -> None:
@@ -92,13 +92,13 @@ class RefusalCounter:
         self._total = 0
         self._by_mesh: dict[str, int] = {}
 
-    def count(self, refusal: Refusal) -> None:
-        """Add the messages of one refusal."""
+    def count(self, rejection: Rejection) -> None:
+        """Add the messages of one rejection."""
         with self._lock:
-            key = (refusal.mesh, refusal.reason)
-            self._counts[key] = self._counts.get(key, 0) + refusal.messages
-            self._total += refusal.messages
-            self._by_mesh[refusal.mesh] = self._by_mesh.get(refusal.mesh, 0) + refusal.messages
+            key = (rejection.mesh, rejection.reason)
+            self._counts[key] = self._counts.get(key, 0) + rejection.messages
+            self._total += rejection.messages
+            self._by_mesh[rejection.mesh] = self._by_mesh.get(rejection.mesh, 0) + rejection.messages
 
     @property
     def total(self) -> int:

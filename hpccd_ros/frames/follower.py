@@ -8,7 +8,7 @@ Transforms, which move each mesh separately, are handled by the pipeline.
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
-from hpccd_ros.frames.drops import Reason, Refusal
+from hpccd_ros.frames.drops import Reason, Rejection
 from hpccd_ros.frames.transform_buffer import TransformBuffer
 from hpccd_ros.frames.types import MeshFrame
 
@@ -16,7 +16,7 @@ from hpccd_ros.frames.types import MeshFrame
 class Followed(NamedTuple):
     """``times``: for each stamp that continues now, (mesh, frame in the scene's frame, whether a new publisher)."""
 
-    refusals: list[Refusal]
+    rejections: list[Rejection]
     times: list[list[tuple[str, MeshFrame, bool]]]
 
 
@@ -43,7 +43,7 @@ class Follower(Protocol):
         """The last stamp at which the meshes can be placed; None: at any time. Raises NoTransformError if something has
         never arrived."""
 
-    def clear(self, reason: Reason) -> list[Refusal]:
+    def clear(self, reason: Reason) -> list[Rejection]:
         """Drop waiting frames, for ``reason``."""
 
     def forget_future(self, stamp: int) -> None:

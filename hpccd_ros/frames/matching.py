@@ -10,7 +10,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-from hpccd_ros.frames.drops import Reason, Refusal
+from hpccd_ros.frames.drops import Reason, Rejection
 from hpccd_ros.frames.types import MeshFrame
 
 # For missing frames that no publisher sends, so their stamps cannot be wrong.
@@ -30,7 +30,7 @@ class Matched(NamedTuple):
     """Result of one frame: the ``matches`` that it completes, oldest first, and frames that are dropped."""
 
     matches: list[Match]
-    refusals: list[Refusal]
+    rejections: list[Rejection]
 
 
 class Matcher(Protocol):
@@ -40,7 +40,7 @@ class Matcher(Protocol):
     def take(self, meshes: Collection[str]) -> list[tuple[str, MeshFrame]]:
         """Remove and return the frames of these meshes that were in no match yet, by stamp."""
 
-    def clear(self, reason: Reason) -> list[Refusal]:
+    def clear(self, reason: Reason) -> list[Rejection]:
         """Drop all waiting frames, for ``reason``."""
 
     @property
@@ -64,37 +64,37 @@ class ExactMatcher:
     def add(self, mesh: str, frame: MeshFrame) -> Matched:
         if self._closed_up_to is not None and frame.stamp <= self._closed_up_to:
             text = f"stamp {frame.stamp} ns was already answered or given up"
-            return Matched([], [Refusal(mesh, Reason.LATE, text)])
+            return Matched([], [Rejection(mesh, Reason.LATE, text)])
         group = self._pending.setdefault(frame.stamp, {})
         group[mesh] = frame
         if len(group) == len(self._meshes):
             del self._pending[frame.stamp]
             self._closed_up_to = frame.stamp
             earlier = [stamp for stamp in self._pending if stamp < frame.stamp]
-            refusals = [refusal for stamp in earlier for refusal in self._give_up(stamp)]
-            return Matched([Match(frame.stamp, group, tuple(self._meshes))], refusals)
+            rejections = [rejection for stamp in earlier for rejection in self._give_up(stamp)]
+            return Matched([Match(frame.stamp, group, tuple(self._meshes))], rejections)
         if len(self._pending) > self._max_pending:
             self._closed_up_to = min(self._pending)
             return Matched([], self._give_up(self._closed_up_to))
         return Matched([], [])
 
-    def _give_up(self, stamp: int) -> list[Refusal]:
+    def _give_up(self, stamp: int) -> list[Rejection]:
         group = self._pending.pop(stamp)
         missing = [m for m in self._meshes if m not in group]
         remedy = _MOVED if self._following.issuperset(missing) else "stamps must be equal (or set stamp_match: nearest)"
         text = f"stamp {stamp} ns has no frame of {', '.join(missing)}; {remedy}"
-        return [Refusal(mesh, Reason.INCOMPLETE, text) for mesh in group]
+        return [Rejection(mesh, Reason.INCOMPLETE, text) for mesh in group]
 
     def take(self, meshes: Collection[str]) -> list[tuple[str, MeshFrame]]:
         return [
             (mesh, group.pop(mesh)) for _, group in sorted(self._pending.items()) for mesh in meshes if mesh in group
         ]
 
-    def clear(self, reason: Reason) -> list[Refusal]:
-        refusals = [Refusal(mesh, reason) for group in self._pending.values() for mesh in group]
+    def clear(self, reason: Reason) -> list[Rejection]:
+        rejections = [Rejection(mesh, reason) for group in self._pending.values() for mesh in group]
         self._pending.clear()
         self._closed_up_to = None
-        return refusals
+        return rejections
 
     @property
     def waiting(self) -> int:
@@ -118,17 +118,17 @@ class NearestMatcher:
     def add(self, mesh: str, frame: MeshFrame) -> Matched:
         queue = self._queues[mesh]
         queue.append(frame)
-        matches, refusals = self._advance()
+        matches, rejections = self._advance()
         if len(queue) > self._max_pending:
             if mesh == self._reference:
                 text = f"stamp {queue.popleft().stamp} ns got no frames of the other meshes"
-                refusals.append(Refusal(mesh, Reason.INCOMPLETE, text))
+                rejections.append(Rejection(mesh, Reason.INCOMPLETE, text))
             else:
-                refusals += self._discard(mesh)
-        return Matched(matches, refusals)
+                rejections += self._discard(mesh)
+        return Matched(matches, rejections)
 
     def _advance(self) -> Matched:
-        matches, refusals = [], []
+        matches, rejections = [], []
         references = self._queues[self._reference]
         while references:
             stamp = references[0].stamp
@@ -137,7 +137,7 @@ class NearestMatcher:
                 break
             reference = references.popleft()
             for mesh in self._others:
-                refusals += self._discard_farther(mesh, stamp)
+                rejections += self._discard_farther(mesh, stamp)
             nearest = {mesh: self._queues[mesh][0] for mesh in self._others}
             far = [m for m, f in nearest.items() if abs(f.stamp - stamp) > self._tolerance]
             if far:
@@ -145,28 +145,28 @@ class NearestMatcher:
                     f"stamp {stamp} ns has no frame of {', '.join(far)} within the tolerance "
                     f"of {self._tolerance} ns (parameter stamp_tolerance)"
                 )
-                refusals.append(Refusal(self._reference, Reason.INCOMPLETE, text))
+                rejections.append(Rejection(self._reference, Reason.INCOMPLETE, text))
                 continue
             fresh = [self._reference] + [m for m, f in nearest.items() if id(f) not in self._used]
             self._used.update(map(id, nearest.values()))
             matches.append(Match(stamp, {self._reference: reference, **nearest}, tuple(fresh)))
-        return Matched(matches, refusals)
+        return Matched(matches, rejections)
 
-    def _discard_farther(self, mesh: str, stamp: int) -> list[Refusal]:
+    def _discard_farther(self, mesh: str, stamp: int) -> list[Rejection]:
         """Leave the frame that is nearest to ``stamp`` as the first of its queue."""
-        queue, refusals = self._queues[mesh], []
+        queue, rejections = self._queues[mesh], []
         # References come in order: a frame that is farther than its successor stays so.
         while len(queue) > 1 and abs(queue[1].stamp - stamp) <= abs(queue[0].stamp - stamp):
-            refusals += self._discard(mesh)
-        return refusals
+            rejections += self._discard(mesh)
+        return rejections
 
-    def _discard(self, mesh: str) -> list[Refusal]:
+    def _discard(self, mesh: str) -> list[Rejection]:
         frame = self._queues[mesh].popleft()
         if id(frame) in self._used:
             self._used.remove(id(frame))
             return []
         text = f"stamp {frame.stamp} ns is not the nearest to a frame of the first mesh"
-        return [Refusal(mesh, Reason.INCOMPLETE, text)]
+        return [Rejection(mesh, Reason.INCOMPLETE, text)]
 
     def take(self, meshes: Collection[str]) -> list[tuple[str, MeshFrame]]:
         taken = []
@@ -178,14 +178,14 @@ class NearestMatcher:
                 queue.clear()
         return sorted(taken, key=lambda item: item[1].stamp)
 
-    def clear(self, reason: Reason) -> list[Refusal]:
-        refusals = [
-            Refusal(mesh, reason) for mesh, queue in self._queues.items() for f in queue if id(f) not in self._used
+    def clear(self, reason: Reason) -> list[Rejection]:
+        rejections = [
+            Rejection(mesh, reason) for mesh, queue in self._queues.items() for f in queue if id(f) not in self._used
         ]
         for queue in self._queues.values():
             queue.clear()
         self._used.clear()
-        return refusals
+        return rejections
 
     @property
     def waiting(self) -> int:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 
 from hpccd_core.rigid.transform import IDENTITY
 from hpccd_ros.frames.assembler import FrameAssembler
-from hpccd_ros.frames.drops import Reason, Refusal
+from hpccd_ros.frames.drops import Reason, Rejection
 from hpccd_ros.frames.follower import Follower
 from hpccd_ros.frames.frame_queue import FrameQueue
 from hpccd_ros.frames.requested_times import RequestedTimes
@@ -55,8 +55,8 @@ class FramePipeline:
         the file."""
         outcome = self._assembler.set_topology(mesh, topology)
         if positions is not None and mesh in self._rigid:
-            if (refusal := self._rigid[mesh].set_shape(positions)) is not None:
-                outcome.refusals.append(refusal)
+            if (rejection := self._rigid[mesh].set_shape(positions)) is not None:
+                outcome.rejections.append(rejection)
         elif positions is not None:
             outcome += self._assembler.add(mesh, positions)
         outcome.static_taken = 0  # they did not come by a message
@@ -77,8 +77,8 @@ class FramePipeline:
         if isinstance(message, Topology):
             return self._led(self._assembler.set_topology(mesh, message, new_publisher))
         if isinstance(message, MeshFrame) and mesh in self._rigid:
-            refusal = self._rigid[mesh].set_shape(message)
-            return Outcome(refusals=[refusal]) if refusal is not None else Outcome(static_taken=1)
+            rejection = self._rigid[mesh].set_shape(message)
+            return Outcome(rejections=[rejection]) if rejection is not None else Outcome(static_taken=1)
         self._assembler.hear(mesh, message.received)
         return self._place(mesh, message, new_publisher)
 
@@ -93,9 +93,9 @@ class FramePipeline:
                 found += self._assemble_followed(follower)
         return found
 
-    def enqueue(self, frame: SceneFrame) -> list[Refusal]:
+    def enqueue(self, frame: SceneFrame) -> list[Rejection]:
         """Put a complete frame into the queue; frames that it replaces are dropped."""
-        return [refusal for lost in self._queue.put(frame) for refusal in lost.refused(Reason.OVERLOAD)]
+        return [rejection for lost in self._queue.put(frame) for rejection in lost.rejected(Reason.OVERLOAD)]
 
     def start(self, capacity: int) -> FrameQueue:
         """Create the queue that `enqueue` fills from now on, for this number of frames that end a step."""
@@ -106,13 +106,13 @@ class FramePipeline:
         """Drop waiting messages as stopped and close the queue. Topologies and static positions stay."""
         outcome = Outcome()
         for transformer in self._transformers.values():
-            outcome.refusals += transformer.clear(Reason.STOPPED)
+            outcome.rejections += transformer.clear(Reason.STOPPED)
         for follower in self._requested.followers:
-            outcome.refusals += follower.clear(Reason.STOPPED)
+            outcome.rejections += follower.clear(Reason.STOPPED)
             follower.forget()
-        outcome.refusals += self._assembler.clear(Reason.STOPPED)
+        outcome.rejections += self._assembler.clear(Reason.STOPPED)
         for frame in self._queue.close() if self._queue is not None else ():
-            outcome.refusals += frame.refused(Reason.STOPPED)
+            outcome.rejections += frame.rejected(Reason.STOPPED)
         self._queue = None
         self._use_transforms(TransformBuffer())
         return outcome
@@ -158,8 +158,8 @@ class FramePipeline:
 
     def _place(self, mesh: str, message: MeshFrame | PoseFrame, new_publisher: bool = False) -> Outcome:
         placed = self._rigid[mesh].place(message) if isinstance(message, PoseFrame) else message
-        if isinstance(placed, Refusal):
-            return Outcome(refusals=[placed])
+        if isinstance(placed, Rejection):
+            return Outcome(rejections=[placed])
         outcome = Outcome()
         for part in self._assemble(mesh, self._transformers[mesh].transform(placed, new_publisher)):
             outcome += part
@@ -168,7 +168,7 @@ class FramePipeline:
     def _led(self, outcome: Outcome) -> Outcome:
         """Add the frames of the other meshes that are requested for accepted frames of the leader."""
         if outcome.restarts and self._leader is not None:  # before the new run is used
-            outcome.refusals += self._clear_requested()
+            outcome.rejections += self._clear_requested()
             for _, stamp, _ in outcome.joined[-1:]:
                 self._requested.forget_future(stamp)
         joined, outcome.joined = outcome.joined, []
@@ -198,23 +198,23 @@ class FramePipeline:
             return Outcome()
         outcome = Outcome()
         if requested.reached.restarted:  # before samples of the previous run place a frame
-            outcome.refusals += self._clear_requested()
+            outcome.rejections += self._clear_requested()
             if requested.reached.set_back:
                 requested.forget_future(stamp)
         outcome += self._ask(stamp, time.monotonic(), new_publisher=requested.reached.restarted)
         return outcome
 
-    def _clear_requested(self) -> list[Refusal]:
+    def _clear_requested(self) -> list[Rejection]:
         """Drop frames that were requested in a run that has ended."""
-        refusals = []
+        rejections = []
         for mesh in self._requested.by_transforms:
-            refusals += self._transformers[mesh.name].clear(Reason.RESTART)
+            rejections += self._transformers[mesh.name].clear(Reason.RESTART)
         for follower in self._requested.followers:
-            refusals += follower.clear(Reason.RESTART)
-        return refusals
+            rejections += follower.clear(Reason.RESTART)
+        return rejections
 
     def _assemble(self, mesh: str, transformed: Transformed) -> list[Outcome]:
-        outcomes = [Outcome(refusals=transformed.refusals)]
+        outcomes = [Outcome(rejections=transformed.rejections)]
         outcomes += [
             self._led(self._assembler.add(mesh, frame, new_publisher)) for frame, new_publisher in transformed.frames
         ]
@@ -222,8 +222,8 @@ class FramePipeline:
 
     def _assemble_followed(self, follower: Follower) -> list[Outcome]:
         """One outcome for each time at which the follower knows its frames now."""
-        refusals, times = follower.retry(self.transforms)
-        outcomes = [Outcome(refusals=refusals)]
+        rejections, times = follower.retry(self.transforms)
+        outcomes = [Outcome(rejections=rejections)]
         for frames in times:
             outcome = Outcome()
             for mesh, frame, new_publisher in frames:

@@ -5,7 +5,7 @@ and the coordinate frame of the scene, rules 4 and 3 of the assembler. No ROS.""
 from dataclasses import dataclass
 
 from hpccd_ros.base.quoting import quoted
-from hpccd_ros.frames.drops import Reason, Refusal
+from hpccd_ros.frames.drops import Reason, Rejection
 from hpccd_ros.frames.types import MeshFrame
 
 
@@ -45,17 +45,17 @@ class StampOrder:
         self._last = stamp
         self._backward = IncreasingStamps()
 
-    def check(self, stamp: int, restart_after: int, from_new_publisher: bool) -> Refusal | Restart | None:
+    def check(self, stamp: int, restart_after: int, from_new_publisher: bool) -> Rejection | Restart | None:
         """None if the message is in order."""
         last = self._last
         if last is None or stamp > last:
             return None
         if stamp == last and not from_new_publisher:
             text = f"stamp {stamp} ns came before; each frame needs a later stamp than the one before"
-            return Refusal(self._mesh, Reason.REPEATED, text)
+            return Rejection(self._mesh, Reason.REPEATED, text)
         if 0 < restart_after <= self._backward.next(stamp) or from_new_publisher:
             return Restart(f"mesh {self._mesh} continues from stamp {stamp} ns after {last} ns")
-        return Refusal(self._mesh, Reason.BACKWARD, f"stamp {stamp} ns is before the last one, {last} ns")
+        return Rejection(self._mesh, Reason.BACKWARD, f"stamp {stamp} ns is before the last one, {last} ns")
 
 
 class CoordinateFrame:
@@ -86,7 +86,7 @@ class CoordinateFrame:
 
     def check(
         self, mesh: str, frame: MeshFrame, restart_after: int, from_new_publisher: bool
-    ) -> Refusal | Restart | None:
+    ) -> Rejection | Restart | None:
         """None if the message fits. from_new_publisher: the publisher is new and the only one of its mesh."""
         if not frame.frame_id or not self.name:
             return None
@@ -100,16 +100,16 @@ class CoordinateFrame:
             self._elsewhere[mesh] = frame.frame_id, run
             if 0 < restart_after <= run.next(frame.stamp) or from_new_publisher:
                 return Restart(f"mesh {mesh} continues in frame {quoted(frame.frame_id)} after {quoted(self.name)}")
-        return self._refuse(mesh, frame)
+        return self._reject(mesh, frame)
 
-    def check_static(self, mesh: str, frame: MeshFrame) -> Refusal | None:
+    def check_static(self, mesh: str, frame: MeshFrame) -> Rejection | None:
         """Positions of a static mesh may be in any frame, unless one is required."""
         fits = not self._demanded or frame.frame_id in ("", self._demanded)
-        return None if fits else self._refuse(mesh, frame)
+        return None if fits else self._reject(mesh, frame)
 
-    def _refuse(self, mesh: str, frame: MeshFrame) -> Refusal:
+    def _reject(self, mesh: str, frame: MeshFrame) -> Rejection:
         text = (
             f"frame_id {quoted(frame.frame_id)}, the scene is in {quoted(self.name)} (by {self.source}); publish all "
             "meshes in one coordinate frame"
         )
-        return Refusal(mesh, Reason.FRAME_ID, text, sent=frame.sent)
+        return Rejection(mesh, Reason.FRAME_ID, text, sent=frame.sent)

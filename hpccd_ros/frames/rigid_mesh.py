@@ -11,7 +11,7 @@ from hpccd_core.rigid.body import Body
 from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.base.quoting import quoted, shortened
 from hpccd_ros.frames.coordinates import unusable_coordinates
-from hpccd_ros.frames.drops import Aspect, Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Reason, Rejection
 from hpccd_ros.frames.types import POSE, TF, UNKNOWN_TIME, MeshFrame, MeshSettings, Placement, PoseFrame, Topology
 
 
@@ -25,7 +25,7 @@ class RigidMesh:
         self._body: Body | None = None
         self._sent = UNKNOWN_TIME  # when the shape was last sent
 
-    def set_shape(self, shape: MeshFrame) -> Refusal | None:
+    def set_shape(self, shape: MeshFrame) -> Rejection | None:
         """Set its vertices, before ``pose``. Equal vertices do not interrupt the motion; a rejected shape leaves the
         previous one."""
         before = self._shape
@@ -36,23 +36,23 @@ class RigidMesh:
         if problem := unusable_coordinates(vertices, by_poses=True):
             reason, text = problem
             text = f"placed by mesh.{self._mesh}.pose {text}"
-            return Refusal(self._mesh, reason, text, aspect=Aspect.SHAPE, sent=shape.sent)
+            return Rejection(self._mesh, reason, text, aspect=Aspect.SHAPE, sent=shape.sent)
         self._shape, self._body, self._sent = shape, Body.of(vertices), shape.sent
         return None
 
-    def place(self, frame: PoseFrame) -> MeshFrame | Refusal:
+    def place(self, frame: PoseFrame) -> MeshFrame | Rejection:
         """The vertices at a pose, as a frame of the mesh."""
         if self._shape is None or self._body is None:
             text = (
                 f"a pose came, and no vertices say what it moves; give a file (parameter mesh.{self._mesh}.file), or "
                 f"publish meshes/{self._mesh}/topology and once meshes/{self._mesh}/vertices, in the body's own frame"
             )
-            return Refusal(self._mesh, Reason.NO_SHAPE, text, sent=frame.sent)
+            return Rejection(self._mesh, Reason.NO_SHAPE, text, sent=frame.sent)
         placement = Placement(self._body, frame.pose)
         if problem := unusable_coordinates(placement.vertices, by_poses=True):
             reason, text = problem
             where = quoted(frame.pose.shift.tolist())
-            return Refusal(self._mesh, reason, f"at the pose {where} {text}", sent=frame.sent)
+            return Rejection(self._mesh, reason, f"at the pose {where} {text}", sent=frame.sent)
         return MeshFrame(
             frame.stamp,
             placement.vertices,

@@ -4,7 +4,7 @@
 from collections import deque
 
 from hpccd_ros.base.quoting import counted
-from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Input, Reason, Rejection
 from hpccd_ros.frames.types import UNKNOWN_TIME, MeshFrame, Topology
 
 # The depth of the node's subscription to topologies (middleware/qos.py): this many can have overtaken a frame.
@@ -62,19 +62,19 @@ class TopologyHistory:
         return False
 
 
-def check_successor(mesh: str, topology: Topology, current: Topology) -> Refusal | None:
+def check_successor(mesh: str, topology: Topology, current: Topology) -> Rejection | None:
     """None if ``topology``, with other content, can follow ``current`` from the same publisher."""
     if topology.version == current.version:
         text = f"version {topology.version} is in force with other content; count the version up with each change"
-        return refused_topology(mesh, Reason.TOPOLOGY_CONFLICT, text, topology)
+        return rejected_topology(mesh, Reason.TOPOLOGY_CONFLICT, text, topology)
     if topology.version < current.version:
         text = f"version {topology.version} is older than {current.version}, now in force"
-        return refused_topology(mesh, Reason.OLD_TOPOLOGY, text, topology)
+        return rejected_topology(mesh, Reason.OLD_TOPOLOGY, text, topology)
     return None
 
 
-def refused_topology(mesh: str, reason: Reason, text: str, topology: Topology) -> Refusal:
-    return Refusal(mesh, reason, text, what=Input.TOPOLOGY, aspect=Aspect.TOPOLOGY, sent=topology.sent)
+def rejected_topology(mesh: str, reason: Reason, text: str, topology: Topology) -> Rejection:
+    return Rejection(mesh, reason, text, what=Input.TOPOLOGY, aspect=Aspect.TOPOLOGY, sent=topology.sent)
 
 
 def is_early(frame: MeshFrame, topology: Topology | None) -> bool:
@@ -82,13 +82,13 @@ def is_early(frame: MeshFrame, topology: Topology | None) -> bool:
     return topology is None or (frame.version is not None and frame.version > topology.version)
 
 
-def check_frame(mesh: str, frame: MeshFrame, topology: Topology) -> Refusal | None:
+def check_frame(mesh: str, frame: MeshFrame, topology: Topology) -> Rejection | None:
     """None if a frame that is not early belongs to ``topology``, of its history."""
     if frame.version is not None and frame.version < topology.version:
         text = f"vertices belong to topology version {frame.version}, version {topology.version} is in force"
-        return Refusal(mesh, Reason.OLD_TOPOLOGY, text, sent=frame.sent)
+        return Rejection(mesh, Reason.OLD_TOPOLOGY, text, sent=frame.sent)
     if len(frame.vertices) != topology.n_vertices:
         given = counted(len(frame.vertices), "vertex", "vertices")
         text = f"{given}, topology version {topology.version} has {topology.n_vertices}"
-        return Refusal(mesh, Reason.WRONG_COUNT, text, sent=frame.sent)
+        return Rejection(mesh, Reason.WRONG_COUNT, text, sent=frame.sent)
     return None

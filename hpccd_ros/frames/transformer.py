@@ -15,7 +15,7 @@ import numpy as np
 from hpccd_core.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames.coordinates import unusable_coordinates
-from hpccd_ros.frames.drops import Aspect, Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Reason, Rejection
 from hpccd_ros.frames.standstill import Standstill
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.frames.types import ALWAYS, TF, MeshFrame, MeshSettings
@@ -25,7 +25,7 @@ class Transformed(NamedTuple):
     """Frames in the scene's frame, each with whether it is the first of a new publisher, and dropped ones."""
 
     frames: list[tuple[MeshFrame, bool]]
-    refusals: list[Refusal]
+    rejections: list[Rejection]
 
 
 @dataclass
@@ -72,24 +72,24 @@ class MeshTransformer:
         if self._kind == "none":
             return Transformed([(frame, new_publisher)], [])
         if text := self._wrong_frame_id(frame):
-            return Transformed([], [self._refuse(Reason.FRAME_ID, text, new_publisher, frame)])
+            return Transformed([], [self._reject(Reason.FRAME_ID, text, new_publisher, frame)])
         if self._kind == "pose":
             moved = self._moved(frame, self._pose, new_publisher)
-            if isinstance(moved, Refusal):
+            if isinstance(moved, Rejection):
                 return Transformed([], [moved])
             return Transformed([(moved, self._noticed(new_publisher))], [])
         if new_publisher and not self._asked and self._last is not None and frame.stamp <= self._last:
             self._transforms.forget_future(frame.stamp)  # before earlier samples place it
         self._last = frame.stamp
         self._waiting.append(_Waiting(frame, new_publisher))
-        frames, refusals = self.retry()
+        frames, rejections = self.retry()
         if len(self._waiting) > self._max_waiting:
-            refusals.append(self._give_up(self._waiting.popleft()))
-        return Transformed(frames, refusals)
+            rejections.append(self._give_up(self._waiting.popleft()))
+        return Transformed(frames, rejections)
 
     def retry(self) -> Transformed:
         """Frames that can continue now. Call it after a transform has arrived."""
-        frames, refusals = [], []
+        frames, rejections = [], []
         passed: list[_Waiting] = []  # before the current one, and not connected
         while self._waiting:
             item = self._waiting[0]
@@ -102,29 +102,29 @@ class MeshTransformer:
                     break
                 self._waiting.popleft()
                 if error.final:
-                    refusals.append(self._give_up(item))
+                    rejections.append(self._give_up(item))
                 else:
                     passed.append(item)
                 continue
             self._waiting.popleft()
             moved = self._moved(item.frame, rigid, item.new_publisher, sent)
-            if isinstance(moved, Refusal):
-                refusals.append(moved)
+            if isinstance(moved, Rejection):
+                rejections.append(moved)
                 continue
-            refusals += [self._give_up(earlier, "; a later frame was placed") for earlier in passed]
+            rejections += [self._give_up(earlier, "; a later frame was placed") for earlier in passed]
             passed.clear()
             frames.append((moved, self._noticed(item.new_publisher)))
             self._standstill.ends()
         self._waiting.extendleft(reversed(passed))
         if self._waiting:
             self._standstill.waits()
-        return Transformed(frames, refusals)
+        return Transformed(frames, rejections)
 
-    def clear(self, reason: Reason) -> list[Refusal]:
+    def clear(self, reason: Reason) -> list[Rejection]:
         """Drop waiting frames, for ``reason``."""
-        refusals = [Refusal(self._mesh, reason) for _ in self._waiting]
+        rejections = [Rejection(self._mesh, reason) for _ in self._waiting]
         self._waiting.clear()
-        return refusals
+        return rejections
 
     def _wrong_frame_id(self, frame: MeshFrame) -> str | None:
         if self._frame and frame.frame_id not in ("", self._frame):
@@ -135,7 +135,7 @@ class MeshTransformer:
             return f"{what}; set it, or parameter mesh.{self._mesh}.frame"
         return None
 
-    def _moved(self, frame: MeshFrame, rigid: Rigid, new_publisher: bool, sent: int = ALWAYS) -> MeshFrame | Refusal:
+    def _moved(self, frame: MeshFrame, rigid: Rigid, new_publisher: bool, sent: int = ALWAYS) -> MeshFrame | Rejection:
         """sent: when the transform was sent."""
         placement = frame.placement.moved(rigid) if frame.placement is not None else None
         if placement is not None:
@@ -145,7 +145,7 @@ class MeshTransformer:
             vertices = frame.vertices if rigid is IDENTITY else rigid.apply(frame.vertices.astype(np.float64))
         if problem := unusable_coordinates(vertices, by_poses=placement is not None):
             reason, text = problem
-            return self._refuse(reason, f"after the transform {text}", new_publisher, frame)
+            return self._reject(reason, f"after the transform {text}", new_publisher, frame)
         sent = min(sent, frame.sent)
         return replace(frame, vertices=vertices, frame_id=self._target, placement=placement, sent=sent)
 
@@ -153,15 +153,15 @@ class MeshTransformer:
         new_publisher, self._unnoticed = new_publisher or self._unnoticed, False
         return new_publisher
 
-    def _give_up(self, item: _Waiting, why: str = "") -> Refusal:
-        refusal = self._refuse(Reason.NO_TRANSFORM, self._missing(item) + why, item.new_publisher, item.frame)
-        return replace(refusal, aspect=Aspect.NOTHING) if self._asked else refusal  # then no message was rejected
+    def _give_up(self, item: _Waiting, why: str = "") -> Rejection:
+        rejection = self._reject(Reason.NO_TRANSFORM, self._missing(item) + why, item.new_publisher, item.frame)
+        return replace(rejection, aspect=Aspect.NOTHING) if self._asked else rejection  # then no message was rejected
 
     def _missing(self, item: _Waiting) -> str:
         if item.connected:
             return item.awaited
         return f"{item.awaited}; {self._transforms.account(item.frame.frame_id or self._frame)}"
 
-    def _refuse(self, reason: Reason, text: str, new_publisher: bool, frame: MeshFrame) -> Refusal:
+    def _reject(self, reason: Reason, text: str, new_publisher: bool, frame: MeshFrame) -> Rejection:
         self._unnoticed |= new_publisher
-        return Refusal(self._mesh, reason, text, sent=None if self._asked else frame.sent)
+        return Rejection(self._mesh, reason, text, sent=None if self._asked else frame.sent)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hpccd_core.rigid.body import Body
 from hpccd_core.rigid.transform import Rigid
-from hpccd_ros.frames.drops import Aspect, Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Reason, Rejection
 
 # Values of parameter mesh.NAME.input for meshes that move by poses; JOINTS: by the joints of their robot.
 POSE, TF, JOINTS = "pose", "tf", "joints"
@@ -187,14 +187,14 @@ class SceneFrame:
         elsewhere = self.frame_id and other.frame_id and self.frame_id != other.frame_id
         return not elsewhere and all(a is b for a, b in zip(self.topologies, other.topologies, strict=True))
 
-    def refused(self, reason: Reason) -> list[Refusal]:
-        """One refusal for each message that is used nowhere else."""
-        return [Refusal(mesh, reason) for mesh in self.fresh]
+    def rejected(self, reason: Reason) -> list[Rejection]:
+        """One rejection for each message that is used nowhere else."""
+        return [Rejection(mesh, reason) for mesh in self.fresh]
 
 
 @dataclass(eq=False, slots=True)
 class Outcome:
-    """``frames`` of the scene that a message completes (usually none or one), ``refusals``: messages that are not used.
+    """``frames`` of the scene that a message completes (usually none or one), ``rejections``: messages not used.
 
     ``restarts``: why the stream restarts, in words. ``static_taken``: accepted messages of static meshes, and shapes of
     those that move by poses. ``asked``: the mesh of each frame that was requested of transforms: it counts as a
@@ -203,7 +203,7 @@ class Outcome:
     """
 
     frames: list[SceneFrame] = field(default_factory=list)
-    refusals: list[Refusal] = field(default_factory=list)
+    rejections: list[Rejection] = field(default_factory=list)
     restarts: list[str] = field(default_factory=list)
     static_taken: int = 0
     asked: list[str] = field(default_factory=list)
@@ -212,7 +212,7 @@ class Outcome:
 
     def __iadd__(self, other: "Outcome") -> "Outcome":
         self.frames += other.frames
-        self.refusals += other.refusals
+        self.rejections += other.rejections
         self.restarts += other.restarts
         self.static_taken += other.static_taken
         self.asked += other.asked

@@ -111,7 +111,7 @@ def _summary(statuses: dict[str, Status], parameters: dict[str, Any]) -> dict[st
         },
         "dropped": int(frames.get("dropped", 0)),
         "dropped_by_reason": _by_reason(frames),
-        "last_rejection": frames.get("last_refusal", ""),
+        "last_rejection": frames.get("last_rejection", ""),
         "stop": {"true": stop["stop"] == "True", "text": statuses["stop"][1]} if stop else None,
     }
 

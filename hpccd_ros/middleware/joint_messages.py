@@ -6,7 +6,7 @@ from typing import Any
 
 from sensor_msgs.msg import JointState
 
-from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.frames.drops import Input, Reason, Rejection
 from hpccd_ros.frames.samples import stray_text
 from hpccd_ros.frames.types import UNKNOWN_TIME
 from hpccd_ros.middleware import fields
@@ -32,22 +32,22 @@ def kept(message: JointState) -> JointState | None:
     return small
 
 
-def too_large(topic: str) -> Refusal:
+def too_large(topic: str) -> Rejection:
     """For a message that is not kept for a robot whose description has not arrived."""
     text = (
         f"a joint state with more than {MOST_JOINTS} names, or {MOST_CHARACTERS} characters of names, is not kept "
         "until the description of its robot comes; publish fewer joints in one message"
     )
-    return Refusal(topic, Reason.TOO_LARGE, text, what=Input.JOINT_STATE)
+    return Rejection(topic, Reason.TOO_LARGE, text, what=Input.JOINT_STATE)
 
 
 def fill(
     robots: Iterable[JointFrames], message: Any, topic: str, sent: int = UNKNOWN_TIME, publisher: int | None = None
-) -> list[Refusal]:
-    """Give a sensor_msgs/JointState of ``topic``, sent at ``sent``, to the robots that it moves. Returns a refusal for
-    each robot that cannot use all of it, and if no robot can use it; other robots still use it. An earlier message is
-    rejected if this one shows that it was far ahead. publisher: number of the publisher if there are several.
-    If publishers contradict each other, a refusal reports it, though the message is used."""
+) -> list[Rejection]:
+    """Give a sensor_msgs/JointState of ``topic``, sent at ``sent``, to the robots that it moves. Returns a rejection
+    for each robot that cannot use all of it, and if no robot can use it; other robots still use it. An earlier message
+    is rejected if this one shows that it was far ahead. publisher: number of the publisher if there are several.
+    If publishers contradict each other, a rejection reports it, though the message is used."""
     problems: list[str] = []
     contradiction = ""
     stray: int | None = None
@@ -55,7 +55,7 @@ def fill(
         stamp = fields.stamp_to_ns(message.header.stamp)
         check_lengths(message.name, message.position)
     except ValueError as error:
-        return [_refusal(topic, str(error), sent)]
+        return [_rejection(topic, str(error), sent)]
     for robot in robots:
         try:
             added = robot.add(stamp, message.name, message.position, sent, publisher)
@@ -66,13 +66,13 @@ def fill(
         contradiction = contradiction or added.contradiction
         if added.unusable:
             problems.append(added.unusable)
-    refusals = [_refusal(topic, problem, sent) for problem in problems[:1]]
+    rejections = [_rejection(topic, problem, sent) for problem in problems[:1]]
     if contradiction:
-        refusals.append(Refusal(topic, Reason.CONTRADICTED, contradiction, what=Input.JOINT_STATE, sent=sent))
+        rejections.append(Rejection(topic, Reason.CONTRADICTED, contradiction, what=Input.JOINT_STATE, sent=sent))
     if stray is not None:
-        refusals.append(Refusal(topic, Reason.AHEAD, stray_text(stray), what=Input.JOINT_STATE, sent=sent))
-    return refusals
+        rejections.append(Rejection(topic, Reason.AHEAD, stray_text(stray), what=Input.JOINT_STATE, sent=sent))
+    return rejections
 
 
-def _refusal(topic: str, problem: str, sent: int) -> Refusal:
-    return Refusal(topic, Reason.MALFORMED, problem, what=Input.JOINT_STATE, sent=sent)
+def _rejection(topic: str, problem: str, sent: int) -> Rejection:
+    return Rejection(topic, Reason.MALFORMED, problem, what=Input.JOINT_STATE, sent=sent)

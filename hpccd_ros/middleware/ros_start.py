@@ -53,7 +53,7 @@ def init(arguments: list[str] | None = None) -> None:
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
 
 
-def refuse_other_arguments(arguments: list[str] | None = None) -> None:
+def reject_other_arguments(arguments: list[str] | None = None) -> None:
     """Raises UserError for arguments that are not of ROS, which rcl ignores; ``arguments``: as in `init`."""
     if others := remove_ros_args(arguments)[1:]:
         raise UserError(

@@ -10,7 +10,7 @@ from typing import Any
 
 from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.base.quoting import quoted
-from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Input, Reason, Rejection
 from hpccd_ros.frames.samples import stray_text
 from hpccd_ros.frames.transform_buffer import TransformBuffer
 from hpccd_ros.frames.types import UNKNOWN_TIME
@@ -55,9 +55,9 @@ def _installed(type_name: str) -> bool:
     return True
 
 
-def fill(buffer: TransformBuffer, message: Any, topic: TransformTopic, sent: int = UNKNOWN_TIME) -> list[Refusal]:
+def fill(buffer: TransformBuffer, message: Any, topic: TransformTopic, sent: int = UNKNOWN_TIME) -> list[Rejection]:
     """Add the transforms in a message of ``topic``, sent at ``sent``, to ``buffer``. Returns rejected ones."""
-    refusals = []
+    rejections = []
     for stamped in message.transforms if hasattr(message, "transforms") else [message]:
         try:
             stray = _add(buffer, stamped, topic.static, sent)
@@ -66,12 +66,14 @@ def fill(buffer: TransformBuffer, message: Any, topic: TransformTopic, sent: int
             text = f"transform from {names}: {error}"
             in_use = buffer.rejected(stamped.child_frame_id, topic.static, sent)
             aspect = Aspect.PLACE if in_use else Aspect.NOTHING
-            refusals.append(Refusal(topic.name, Reason.MALFORMED, text, what=Input.TRANSFORM, aspect=aspect, sent=sent))
+            rejections.append(
+                Rejection(topic.name, Reason.MALFORMED, text, what=Input.TRANSFORM, aspect=aspect, sent=sent)
+            )
             continue
         if stray is not None:
             text = f"transform from {quoted(stamped.child_frame_id)}: {stray_text(stray)}"
-            refusals.append(Refusal(topic.name, Reason.AHEAD, text, what=Input.TRANSFORM, sent=sent))
-    return refusals
+            rejections.append(Rejection(topic.name, Reason.AHEAD, text, what=Input.TRANSFORM, sent=sent))
+    return rejections
 
 
 def _add(buffer: TransformBuffer, stamped: Any, static: bool, sent: int) -> int | None:

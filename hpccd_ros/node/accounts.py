@@ -9,13 +9,13 @@ from typing import Any
 
 from hpccd_ros.base.quoting import counted, listed, shortened
 from hpccd_ros.detect.step_detector import Detection
-from hpccd_ros.frames.drops import Input, Reason, Refusal, RefusalCounter
+from hpccd_ros.frames.drops import Input, Reason, Rejection, RejectionCounter
 from hpccd_ros.frames.taken_inputs import TakenInputs
 from hpccd_ros.frames.types import Outcome, SceneFrame
 from hpccd_ros.node.metrics import Metrics
 
 # Messages of no mesh: name of their count in ``connections``.
-REFUSED_BESIDE_MESHES = {Input.TRANSFORM: "transforms_refused", Input.JOINT_STATE: "joint_states_refused"}
+REJECTED_BESIDE_MESHES = {Input.TRANSFORM: "transforms_rejected", Input.JOINT_STATE: "joint_states_rejected"}
 
 
 class Accounts:
@@ -24,23 +24,23 @@ class Accounts:
     ``static_taken``: accepted messages of static meshes, which count as answered. ``requests``: to ~/detect, service
     and action, by how they ended. ``inputs``: those taken since the node was configured. ``heard``: topics
     (relative names) of closed subscriptions that had a message since then. warn: logs a text.
-    on_refused: called with each refusal, in the thread that refuses. on_received: called with each input message: its
-    kind, its mesh or topic, and the middleware's info about it.
+    on_rejected: called with each rejection, in the thread that rejects. on_received: called with each input message:
+    its kind, its mesh or topic, and the middleware's info about it.
     """
 
     def __init__(self, warn: Callable[[str], None]) -> None:
         self._warn = warn
-        self.log = RefusalLog(warn)
-        self.dropped = RefusalCounter()
-        self.topologies_refused = RefusalCounter()
+        self.log = RejectionLog(warn)
+        self.dropped = RejectionCounter()
+        self.topologies_rejected = RejectionCounter()
         self.metrics = Metrics()
         self.connections: Counter = Counter()
-        self.requests = Counter(answered=0, refused=0, busy=0, timed_out=0, failed=0, stopped=0, canceled=0)
+        self.requests = Counter(answered=0, rejected=0, busy=0, timed_out=0, failed=0, stopped=0, canceled=0)
         self.restarts = 0
         self.static_taken = 0
         self.heard: set[str] = set()
         self.inputs = TakenInputs()
-        self.on_refused: Callable[[Refusal], None] = lambda refusal: None
+        self.on_rejected: Callable[[Rejection], None] = lambda rejection: None
         self.on_received: Callable[[str, str, dict[str, Any]], None] = lambda kind, name, info: None
 
     def add(self, outcome: Outcome) -> None:
@@ -50,24 +50,24 @@ class Accounts:
             self._warn(text)
         self.static_taken += outcome.static_taken
         for mesh, sent in outcome.unplaced:
-            self.on_refused(Refusal(mesh, Reason.STATIC_MISSING, sent=sent))
+            self.on_rejected(Rejection(mesh, Reason.STATIC_MISSING, sent=sent))
         for mesh in outcome.asked:
             self.metrics.frame_received(mesh, None)
-        for refusal in outcome.refusals:
-            self._count(refusal)
-        self.log.together(outcome.refusals)
+        for rejection in outcome.rejections:
+            self._count(rejection)
+        self.log.together(outcome.rejections)
 
-    def refused(self, refusal: Refusal) -> None:
+    def rejected(self, rejection: Rejection) -> None:
         """Count it, and log its text if it has one."""
-        self._count(refusal)
-        self.log.together([refusal])
+        self._count(rejection)
+        self.log.together([rejection])
 
-    def _count(self, refusal: Refusal) -> None:
-        if refusal.what in REFUSED_BESIDE_MESHES:
-            self.connections[REFUSED_BESIDE_MESHES[refusal.what]] += refusal.messages
+    def _count(self, rejection: Rejection) -> None:
+        if rejection.what in REJECTED_BESIDE_MESHES:
+            self.connections[REJECTED_BESIDE_MESHES[rejection.what]] += rejection.messages
         else:
-            (self.topologies_refused if refusal.what is Input.TOPOLOGY else self.dropped).count(refusal)
-        self.on_refused(refusal)
+            (self.topologies_rejected if rejection.what is Input.TOPOLOGY else self.dropped).count(rejection)
+        self.on_rejected(rejection)
 
     def answered(self, found: Detection, total: int, sent: int) -> None:
         """Count a step: ``total`` contacts were found, ``sent`` of them have just been published."""
@@ -95,8 +95,8 @@ class Accounts:
 
     def unanswered(self, frame: SceneFrame, reason: Reason) -> None:
         """Count a frame that was passed to the detection and has no result."""
-        for refusal in frame.refused(reason):
-            self.refused(refusal)
+        for rejection in frame.rejected(reason):
+            self.rejected(rejection)
 
     def failed(self, frame: SceneFrame, error: Exception) -> None:
         """Count the step that ends with ``frame`` as failed, with the reason."""
@@ -120,7 +120,7 @@ def _coarse(found: Detection) -> str:
 _LONGEST = 500
 
 
-class RefusalLog:
+class RejectionLog:
     """Passes on the first text of each (mesh, reason), then one every ``period`` s; links of a robot count as one
     mesh."""
 
@@ -136,14 +136,14 @@ class RefusalLog:
     def __call__(self, mesh: str, reason: Reason, text: str) -> None:
         self._log(mesh, mesh, reason, shortened(text, _LONGEST))
 
-    def together(self, refusals: Iterable[Refusal]) -> None:
-        """Those that have a text. One text stands for all links of a robot that were refused for the same reason."""
-        alike: dict[tuple[str, Reason], list[Refusal]] = {}
-        for refusal in refusals:
-            if refusal.text and (robot := _robot(refusal)):
-                alike.setdefault((robot, refusal.reason), []).append(refusal)
-            elif refusal.text:
-                self(refusal.mesh, refusal.reason, refusal.text)
+    def together(self, rejections: Iterable[Rejection]) -> None:
+        """Those that have a text. One text stands for all links of a robot that were rejected for the same reason."""
+        alike: dict[tuple[str, Reason], list[Rejection]] = {}
+        for rejection in rejections:
+            if rejection.text and (robot := _robot(rejection)):
+                alike.setdefault((robot, rejection.reason), []).append(rejection)
+            elif rejection.text:
+                self(rejection.mesh, rejection.reason, rejection.text)
         for (robot, reason), (first, *others) in alike.items():
             names = dict.fromkeys(other.mesh for other in others if other.mesh != first.mesh)
             more = f"; as well {listed(names)}" if names else ""
@@ -160,7 +160,7 @@ class RefusalLog:
         self._warn(self.last + (f" ({count} more of these in between)" if count else ""))
 
 
-def _robot(refusal: Refusal) -> str:
+def _robot(rejection: Rejection) -> str:
     """Of which the mesh is a link; "": of none."""
-    robot, slash, _ = refusal.mesh.partition("/")
-    return robot if slash and refusal.what is Input.VERTICES else ""
+    robot, slash, _ = rejection.mesh.partition("/")
+    return robot if slash and rejection.what is Input.VERTICES else ""

@@ -15,7 +15,7 @@ from hpccd_ros.middleware import qos, topic_names
 from hpccd_ros.middleware.action_server import KEPT, BoundedActionServer
 from hpccd_ros.node.detect_jobs import DetectJobs, Ticket
 from hpccd_ros.node.detect_query import WAITING
-from hpccd_ros.node.detect_service import DELIVERY, FAREWELL, ROOM_TO_REFUSE
+from hpccd_ros.node.detect_service import DELIVERY, FAREWELL, ROOM_TO_REJECT
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 
 # s between feedback messages of a goal.
@@ -49,9 +49,9 @@ class DetectAction:
             Detect,
             topic_names.DETECT,
             self._execute,
-            goals=jobs.capacity + ROOM_TO_REFUSE,
+            goals=jobs.capacity + ROOM_TO_REJECT,
             room=MOST_KEPT,
-            requests=qos.requests(jobs.capacity + ROOM_TO_REFUSE),
+            requests=qos.requests(jobs.capacity + ROOM_TO_REJECT),
             rejected=self._count_rejected,
             forgotten=_forget,
             handle_accepted_callback=self._accept,

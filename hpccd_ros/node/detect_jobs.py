@@ -122,12 +122,12 @@ class DetectJobs:
         try:
             return await self._computed(request, response, ticket)
         except RequestError as error:
-            return self.refuse(response, ticket, "refused", str(error))
+            return self.reject(response, ticket, "rejected", str(error))
         except Exception as error:  # here and not only by the executor's guard, so that it is counted as failed
             text = self._node.errors.caught(topic_names.DETECT, error)
-            return self.refuse(type(response)(), ticket, "failed", text)
+            return self.reject(type(response)(), ticket, "failed", text)
 
-    def refuse(self, response: R, ticket: Ticket, ended: str, text: str) -> R:
+    def reject(self, response: R, ticket: Ticket, ended: str, text: str) -> R:
         self._end(ticket, ended)
         response.success, response.message = False, shortened(text, LONGEST_MESSAGE)
         response.collision_free_step = math.nan
@@ -135,13 +135,13 @@ class DetectJobs:
 
     async def _computed(self, request: Request, response: R, ticket: Ticket) -> R:
         if ticket.given_up is not None:
-            return self.refuse(response, ticket, *ticket.given_up)
+            return self.reject(response, ticket, *ticket.given_up)
         ticket.time_limit = limit = self._time_limit(request)
         scene = self._scene()
         if isinstance(scene, str):
             raise RequestError(scene)
         if not self._enter(ticket):
-            return self.refuse(
+            return self.reject(
                 response,
                 ticket,
                 "busy",
@@ -158,11 +158,11 @@ class DetectJobs:
         await self._settled(job, ticket)
         if ticket.given_up is not None:
             job.cancel()
-            return self.refuse(response, ticket, *ticket.given_up)
+            return self.reject(response, ticket, *ticket.given_up)
         if not job.done():
             job.cancel()
             ticket.cancellation.cancel()
-            return self.refuse(
+            return self.reject(
                 response,
                 ticket,
                 "timed_out",
@@ -174,7 +174,7 @@ class DetectJobs:
         except RequestError:
             raise
         except CORE_ERRORS as error:
-            return self.refuse(response, ticket, "failed", f"{type(error).__name__}: {error}")
+            return self.reject(response, ticket, "failed", f"{type(error).__name__}: {error}")
         if answer.contacts is not None:
             response.contacts = answer.contacts
         if answer.distances is not None:

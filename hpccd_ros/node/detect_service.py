@@ -16,7 +16,7 @@ from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 
 # Queue of the service for requests beyond the accepted ones: a burst is answered with "busy" and not lost. Bounds the
 # memory that untrusted clients can use.
-ROOM_TO_REFUSE = 1000
+ROOM_TO_REJECT = 1000
 # s for answering requests that were not processed before the service ends.
 FAREWELL = 0.5
 # s that the service exists after its last answer: DDS announces its end on another channel, which overtook 4 of 610
@@ -38,7 +38,7 @@ class DetectService:
             Detect,
             topic_names.DETECT,
             self._answer,
-            qos_profile=qos.requests(jobs.capacity + ROOM_TO_REFUSE),
+            qos_profile=qos.requests(jobs.capacity + ROOM_TO_REJECT),
             callback_group=self._group,
         )
         self._introspection = "off"
@@ -75,8 +75,8 @@ class DetectService:
                 request, header = self._service.handle.service_take_request(Detect.Request)
                 if header is None:
                     return
-                refused = self._jobs.refuse(Detect.Response(), Ticket(WAITING), "stopped", STOPPED)
-                self._service.send_response(refused, header)
+                rejected = self._jobs.reject(Detect.Response(), Ticket(WAITING), "stopped", STOPPED)
+                self._service.send_response(rejected, header)
                 self._last_answer = time.monotonic()
 
     async def _answer(self, request: Detect.Request, response: Detect.Response) -> Detect.Response:

@@ -27,7 +27,7 @@ class GuardedLifecycleNode(LifecycleNode):
         self._callbacks = {state: self._guarded(callback) for state, callback in self._callbacks.items()}
         self._configured = contextlib.ExitStack()
         service = self._service_change_state
-        service.callback = self._refuse_or(service.callback)
+        service.callback = self._reject_or(service.callback)
 
     @property
     def state(self) -> str:
@@ -71,7 +71,7 @@ class GuardedLifecycleNode(LifecycleNode):
 
         return transition
 
-    def _refuse_or(self, change: Callable) -> Callable:
+    def _reject_or(self, change: Callable) -> Callable:
         # rclpy 7.1 raises for a transition that the state does not have (ros2/rclpy#1209).
         def change_state(request: ChangeState.Request, response: ChangeState.Response) -> ChangeState.Response:
             wanted = request.transition

@@ -14,7 +14,7 @@ from rclpy.subscription import Subscription
 from hpccd_ros.base.quoting import counted
 from hpccd_ros.detect.core import unusable_topology
 from hpccd_ros.frames.arrivals import RateLimit, SequenceWatch
-from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Input, Reason, Rejection
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.taken_inputs import NEW_PUBLISHER, SEVERAL_PUBLISHERS
 from hpccd_ros.frames.welding import Welding
@@ -113,17 +113,17 @@ class MeshTopic:
             return None
         return f"more than {self.reception.settings['max_rate']:g} messages a second (parameter max_rate)"
 
-    def refuse(self, reason: Reason, text: str, messages: int = 1) -> None:
-        """Refuse the message taken last, or messages before it."""
-        self._refuse(reason, text, messages, self.sent)
+    def reject(self, reason: Reason, text: str, messages: int = 1) -> None:
+        """Reject the message taken last, or messages before it."""
+        self._reject(reason, text, messages, self.sent)
 
-    def refuse_unreadable(self) -> None:
-        """Refuse a message that cannot be deserialised, so that the time at which it was sent is unknown."""
-        self._refuse(Reason.MALFORMED, f"{self.name}: {UNREADABLE}", 1, None)
+    def reject_unreadable(self) -> None:
+        """Reject a message that cannot be deserialised, so that the time at which it was sent is unknown."""
+        self._reject(Reason.MALFORMED, f"{self.name}: {UNREADABLE}", 1, None)
 
-    def _refuse(self, reason: Reason, text: str, messages: int, sent: int | None) -> None:
-        self.reception.accounts.refused(
-            Refusal(self.reception.mesh, reason, text, messages, what=self.what, aspect=self.aspect, sent=sent)
+    def _reject(self, reason: Reason, text: str, messages: int, sent: int | None) -> None:
+        self.reception.accounts.rejected(
+            Rejection(self.reception.mesh, reason, text, messages, what=self.what, aspect=self.aspect, sent=sent)
         )
 
     @property
@@ -154,22 +154,22 @@ class MeshTopic:
 class TopologySubscription(MeshTopic):
     def __init__(self, reception: Reception) -> None:
         super().__init__(reception, topic_names.TOPOLOGY)
-        executors.watch_unreadable(self.subscribe(self.receive, qos.TOPOLOGY_INPUT), self.refuse_unreadable)
+        executors.watch_unreadable(self.subscribe(self.receive, qos.TOPOLOGY_INPUT), self.reject_unreadable)
 
     def receive(self, message: MeshTopology, info: dict[str, Any]) -> None:
         of = self.reception
         self.take(info)
         _, new_publisher = self.numbers.next(info["publication_sequence_number"])
         if why := self.too_fast():
-            self.refuse(Reason.RATE, why)
+            self.reject(Reason.RATE, why)
             return
         try:
             topology = mesh_inputs.read(self.kind, message, of.settings, sent=info["source_timestamp"])
         except InvalidMessageError as error:
-            of.accounts.refused(error.refusal(of.mesh, self.what, self.aspect, self.sent))
+            of.accounts.rejected(error.rejection(of.mesh, self.what, self.aspect, self.sent))
             return
         if why := unusable_topology(topology):
-            self.refuse(Reason.BAD_TOPOLOGY, why)
+            self.reject(Reason.BAD_TOPOLOGY, why)
             return
         self.taken(info["source_timestamp"], new_publisher)
         hand_over(of.pipeline.push(of.mesh, topology, new_publisher), of.pipeline, of.accounts)
@@ -191,7 +191,7 @@ class PositionsSubscription(MeshTopic):
         self.take(info)
         self._count_received(info)
         if why := self.too_fast():
-            self.refuse(Reason.RATE, why)
+            self.reject(Reason.RATE, why)
             return
         # Asked only where it can matter, as it takes 4 us: of a frame in another frame_id, which may be a restart.
         here = hasattr(message, "header") and message.header.frame_id == of.pipeline.coordinate_frame[0]
@@ -200,8 +200,8 @@ class PositionsSubscription(MeshTopic):
         try:
             frame = mesh_inputs.read(self.kind, message, of.settings, received, alone, sent=sent, welding=self._welding)
         except InvalidMessageError as error:
-            self.taken(sent, False)  # listed, because a replay reads and refuses it too
-            of.accounts.refused(error.refusal(of.mesh, aspect=self.aspect, sent=sent))
+            self.taken(sent, False)  # listed, because a replay reads and rejects it too
+            of.accounts.rejected(error.rejection(of.mesh, aspect=self.aspect, sent=sent))
             return
         of.accounts.metrics.stamped(of.mesh, frame.stamp)
         new_publisher = self.numbers.notice()
@@ -221,18 +221,18 @@ class PositionsSubscription(MeshTopic):
         missing -= unreadable
         if unreadable:  # some of the same gap were, so that these are taken for unreadable too
             of.accounts.metrics.frame_received(of.mesh, None, missing)
-            self.refuse(Reason.MALFORMED, f"{self.name}: {UNREADABLE}", missing)
+            self.reject(Reason.MALFORMED, f"{self.name}: {UNREADABLE}", missing)
             return
         text = (
             f"{counted(missing, 'message')} did not reach the node: sent faster than it reads (parameter input_depth), "
             "or not to be deserialised (see the log of DDS)"
         )
-        self.refuse(Reason.MIDDLEWARE, text, missing)
+        self.reject(Reason.MIDDLEWARE, text, missing)
 
     def _on_unreadable(self) -> None:
         self._unreadable += 1
         self.reception.accounts.metrics.frame_received(self.reception.mesh, None, 1)
-        self.refuse_unreadable()
+        self.reject_unreadable()
 
 
 class MeshSubscriptions:

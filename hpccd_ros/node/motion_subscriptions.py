@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState
 from hpccd_ros.base.clocks import Clocks
 from hpccd_ros.base.quoting import counted
 from hpccd_ros.frames.arrivals import InterleavedSequences, RateLimit
-from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.frames.drops import Input, Reason, Rejection
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.middleware import executors, graph, joint_messages, message_types, qos, transform_topics
 from hpccd_ros.middleware.message_types import message_class
@@ -33,12 +33,12 @@ from hpccd_ros.robots.joint_publishers import PublisherNumbers
 
 @dataclass
 class _Recent:
-    """``sent``, ``publisher``: as in `joint_messages.fill`. ``refused``: its refusal is already counted."""
+    """``sent``, ``publisher``: as in `joint_messages.fill`. ``rejected``: its rejection is already counted."""
 
     message: JointState
     sent: int
     publisher: int | None
-    refused: bool
+    rejected: bool
 
 
 class JointSubscriptions:
@@ -69,10 +69,10 @@ class JointSubscriptions:
         for topic, robots in robot_parameters.joint_topics(self._settings[ROBOT]).items():
             moved = [by_joints[robot] for robot in robots if robot in by_joints]
             for recent in self._recent[topic]:
-                refusals = joint_messages.fill(moved, recent.message, topic, recent.sent, recent.publisher)
-                if not recent.refused:
-                    self._refuse(refusals)
-                    recent.refused = bool(refusals)
+                rejections = joint_messages.fill(moved, recent.message, topic, recent.sent, recent.publisher)
+                if not recent.rejected:
+                    self._reject(rejections)
+                    recent.rejected = bool(rejections)
 
     def close(self) -> None:
         for subscription in self._subscriptions:
@@ -113,19 +113,19 @@ class JointSubscriptions:
             publisher = numbers.of(info["publication_sequence_number"], several)
             if not limit.allows():
                 text = f"more than max_rate = {self._settings['max_rate']:g} messages a second; some are dropped"
-                self._refuse([Refusal(topic, Reason.RATE, text, what=Input.JOINT_STATE, sent=sent)])
+                self._reject([Rejection(topic, Reason.RATE, text, what=Input.JOINT_STATE, sent=sent)])
                 return
             self._accounts.inputs.add(topic, sent)
             stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
             self._accounts.metrics.stamped(topic, stamp)
             self._watches[topic].receive(stamp, message.name, message.position)
             moved = [self._of_robots[robot] for robot in robots if robot in self._of_robots]
-            refusals = joint_messages.fill(moved, message, topic, sent, publisher)
+            rejections = joint_messages.fill(moved, message, topic, sent, publisher)
             if (kept := joint_messages.kept(message)) is not None:
-                self._recent[topic].append(_Recent(kept, sent, publisher, bool(refusals)))
-            elif len(moved) < len(robots) and not refusals:
-                refusals = [joint_messages.too_large(topic)]
-            self._refuse(refusals)
+                self._recent[topic].append(_Recent(kept, sent, publisher, bool(rejections)))
+            elif len(moved) < len(robots) and not rejections:
+                rejections = [joint_messages.too_large(topic)]
+            self._reject(rejections)
             for outcome in self._pipeline.retry():
                 hand_over(outcome, self._pipeline, self._accounts)
 
@@ -143,13 +143,13 @@ class JointSubscriptions:
         def several() -> bool:
             return subscription.subscription.get_publisher_count() > 1
 
-        refusal = Refusal(topic, Reason.MALFORMED, f"{topic}: {UNREADABLE}", what=Input.JOINT_STATE)
-        executors.watch_unreadable(subscription.subscription, lambda: self._refuse([refusal]))
+        rejection = Rejection(topic, Reason.MALFORMED, f"{topic}: {UNREADABLE}", what=Input.JOINT_STATE)
+        executors.watch_unreadable(subscription.subscription, lambda: self._reject([rejection]))
         return subscription
 
-    def _refuse(self, refusals: list[Refusal]) -> None:
-        for refusal in refusals:
-            self._accounts.refused(refusal)
+    def _reject(self, rejections: list[Rejection]) -> None:
+        for rejection in rejections:
+            self._accounts.rejected(rejection)
 
 
 class TransformSubscriptions:
@@ -204,7 +204,7 @@ class TransformSubscriptions:
         def on_unreadable() -> None:
             nonlocal unreadable_since
             unreadable_since += 1
-            self._unread(Refusal(topic.name, Reason.MALFORMED, f"{name}: {UNREADABLE}", what=Input.TRANSFORM), topic)
+            self._unread(Rejection(topic.name, Reason.MALFORMED, f"{name}: {UNREADABLE}", what=Input.TRANSFORM), topic)
 
         def matched(event: Any) -> None:
             new = event.total_count_change
@@ -217,15 +217,15 @@ class TransformSubscriptions:
             lost = missing(info["publication_sequence_number"])
             if not limit.allows():
                 text = f"more than max_rate = {self._max_rate:g} messages a second; some are dropped"
-                self._unread(Refusal(topic.name, Reason.RATE, text, what=Input.TRANSFORM, sent=sent), topic)
+                self._unread(Rejection(topic.name, Reason.RATE, text, what=Input.TRANSFORM, sent=sent), topic)
                 return
             self._accounts.inputs.add(topic.name, sent)
             if lost > 0:
                 text = f"{name}: lost, or not to be deserialised: {counted(lost, 'message')}; send them again"
-                refusal = Refusal(topic.name, Reason.MIDDLEWARE, text, lost, what=Input.TRANSFORM, sent=sent - 1)
-                self._unread(refusal, topic)
-            for refusal in transform_topics.fill(self._pipeline.transforms, message, topic, sent):
-                self._accounts.refused(refusal)
+                rejection = Rejection(topic.name, Reason.MIDDLEWARE, text, lost, what=Input.TRANSFORM, sent=sent - 1)
+                self._unread(rejection, topic)
+            for rejection in transform_topics.fill(self._pipeline.transforms, message, topic, sent):
+                self._accounts.rejected(rejection)
             for outcome in self._pipeline.retry():
                 hand_over(outcome, self._pipeline, self._accounts)
 
@@ -238,11 +238,11 @@ class TransformSubscriptions:
         executors.watch_unreadable(subscription.subscription, on_unreadable)
         return subscription
 
-    def _unread(self, refusal: Refusal, topic: TransformTopic) -> None:
-        """Refuse a message whose transforms are unknown."""
-        sent = refusal.sent or Clocks().system()
+    def _unread(self, rejection: Rejection, topic: TransformTopic) -> None:
+        """Reject a message whose transforms are unknown."""
+        sent = rejection.sent or Clocks().system()
         self._pipeline.transforms.rejected(None, topic.static, sent)
-        self._accounts.refused(refusal)
+        self._accounts.rejected(rejection)
 
     def _name(self, topic: TransformTopic) -> str:
         return self._node.resolve_topic_name(topic.name)

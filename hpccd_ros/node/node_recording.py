@@ -80,7 +80,7 @@ class NodeRecording:
 
 
 def unrecordable(settings: dict[str, Any]) -> str | None:
-    """Why nothing can be recorded with these settings, or None; a disk may still refuse later."""
+    """Why nothing can be recorded with these settings, or None; a disk may still reject later."""
     if not settings["record"]:
         return None
     try:

@@ -13,7 +13,7 @@ TYPES = {kind.value for kind in parameter.Parameter.Type}
 
 
 def replace_callbacks(node: Node) -> None:
-    """Values of a type that does not exist are refused with a reason; rclpy 7.1 raises, and nobody is answered.
+    """Values of a type that does not exist are rejected with a reason; rclpy 7.1 raises, and nobody is answered.
     Integers become floats where the parameter is one: `ros2 param set` takes a number without a point for an integer.
     """
     for service in node.services:
@@ -26,11 +26,11 @@ def replace_callbacks(node: Node) -> None:
 def _each(node, set_parameters):
     def answer(request: SetParameters.Request, response: SetParameters.Response) -> SetParameters.Response:
         for given in request.parameters:
-            if (refused := _refusal(node, given)) is None:
+            if (rejected := _rejection(node, given)) is None:
                 one = SetParameters.Request(parameters=[_as_declared(node, given)])
                 response.results += set_parameters(one, SetParameters.Response()).results
             else:
-                response.results.append(refused)
+                response.results.append(rejected)
         return response
 
     return answer
@@ -41,8 +41,8 @@ def _all(node, set_atomically):
         request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
     ) -> SetParametersAtomically.Response:
         for given in request.parameters:
-            if (refused := _refusal(node, given)) is not None:
-                response.result = refused
+            if (rejected := _rejection(node, given)) is not None:
+                response.result = rejected
                 return response
         request.parameters = [_as_declared(node, given) for given in request.parameters]
         return set_atomically(request, response)
@@ -50,7 +50,7 @@ def _all(node, set_atomically):
     return answer
 
 
-def _refusal(node: Node, given: Parameter) -> SetParametersResult | None:
+def _rejection(node: Node, given: Parameter) -> SetParametersResult | None:
     if given.value.type not in TYPES:
         reason = f"{given.name}: type {given.value.type} is not valid; use one of rcl_interfaces/msg/ParameterType"
     elif not node.has_parameter(given.name):

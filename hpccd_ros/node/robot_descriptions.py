@@ -44,7 +44,7 @@ class RobotDescriptions:
         self._semantics: dict[str, str | None] = {}
         self._texts: dict[str, str] = {}  # in use
         self._waiting: dict[str, str] = {}  # came too soon after the last
-        self._refused: dict[str, str] = {}  # why the last description was
+        self._rejected: dict[str, str] = {}  # why the last description was
         self._warned: dict[str, tuple[str, ...]] = {}  # of the last one that was not
         self._reading: list[str] = []
         self._read = -PERIOD  # when it ended
@@ -65,21 +65,21 @@ class RobotDescriptions:
     def doubts(self) -> dict[str, str]:
         """Robots with a newer description that is not in use, and why."""
         newer = dict.fromkeys([*self._reading, *self._waiting], "its new description is being read")
-        return newer | {name: f"its description was rejected: {why}" for name, why in self._refused.items()}
+        return newer | {name: f"its description was rejected: {why}" for name, why in self._rejected.items()}
 
     def warnings(self) -> list[str]:
         """Robots that are not known, and publishers that are not connected."""
         waiting = [
             f"robot {name} waits for its description on {full}{self._why(full)}"
             for name, topic in self._topics.items()
-            if name not in self.robots and name not in self._refused
+            if name not in self.robots and name not in self._rejected
             for full in [self._node.resolve_topic_name(topic)]
         ]
         return waiting + unconnected(self._subscriptions.values())
 
     def rejected(self) -> list[str]:
         """Which descriptions cannot be used; the log has each as an error."""
-        return [f"robot {name}: {why}" for name, why in self._refused.items()]
+        return [f"robot {name}: {why}" for name, why in self._rejected.items()]
 
     def _why(self, topic: str) -> str:
         if not self._node.count_publishers(topic):
@@ -117,13 +117,13 @@ class RobotDescriptions:
         subscription = self._subscriptions[name] = InputSubscription(
             self._node, String, topic, lambda message: self._receive(name, message.data), qos.DESCRIPTION
         )
-        executors.watch_unreadable(subscription.subscription, lambda: self._refuse(name, "it cannot be deserialised"))
+        executors.watch_unreadable(subscription.subscription, lambda: self._reject(name, "it cannot be deserialised"))
         self._node.when_unconfigured(subscription.close)
 
     def _receive(self, name: str, text: str) -> None:
         if text == self._texts.get(name):
             self._waiting.pop(name, None)
-            self._refused.pop(name, None)
+            self._rejected.pop(name, None)
             self._on_doubt()
             return
         self._waiting[name] = text
@@ -150,19 +150,19 @@ class RobotDescriptions:
 
     def _was_read(self, name: str) -> bool:
         """Whether the first description of the robot was parsed: the scene waits for it."""
-        return name in self._texts or name in self._refused
+        return name in self._texts or name in self._rejected
 
     def _take(self, name: str, text: str) -> None:
         try:
             self.robots[name] = self._made(name, text)
         except RobotError as error:
-            self._refuse(name, shortened(error, LONGEST))
+            self._reject(name, shortened(error, LONGEST))
             return
         self._texts[name] = text
-        self._refused.pop(name, None)
+        self._rejected.pop(name, None)
 
-    def _refuse(self, name: str, why: str) -> None:
+    def _reject(self, name: str, why: str) -> None:
         kept = "; the previous one stays in use" if name in self.robots else ""
-        self._refused[name] = f"{why}{kept}"
-        self._node.get_logger().error(f"robot {name}: {self._refused[name]}")
+        self._rejected[name] = f"{why}{kept}"
+        self._node.get_logger().error(f"robot {name}: {self._rejected[name]}")
         self._on_doubt()

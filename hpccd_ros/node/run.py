@@ -30,14 +30,14 @@ def main(argv: list[str] | None = None, node_type: type[HpccdNode] = HpccdNode) 
     environment.prepare()
     try:
         ros_start.init(argv)
-        ros_start.refuse_other_arguments(argv)
+        ros_start.reject_other_arguments(argv)
         node = node_type()
     except ParameterError as error:
         return _not_started(ros_start.WRONG_PARAMETERS, str(error))
     except Exception as error:
-        if (refused := ros_start.start_failure(error)) is None:
+        if (rejected := ros_start.start_failure(error)) is None:
             raise
-        return _not_started(*refused)
+        return _not_started(*rejected)
     executor = _Executor(node.errors)
     executor.add_node(node)
     try:

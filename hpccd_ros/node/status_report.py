@@ -12,7 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from hpccd_ros.base.quoting import counted, listed
 from hpccd_ros.frames.drops import Reason
 from hpccd_ros.middleware import topic_names
-from hpccd_ros.node.accounts import REFUSED_BESIDE_MESHES, Accounts
+from hpccd_ros.node.accounts import REJECTED_BESIDE_MESHES, Accounts
 from hpccd_ros.node.metrics import percentiles
 
 
@@ -27,8 +27,8 @@ class Reporter:
         self._detections = 0
         self._coarse = 0
         self._dropped: dict[Reason, int] = {}
-        self._topologies_refused = 0
-        self._refused_beside = dict.fromkeys(REFUSED_BESIDE_MESHES, 0)
+        self._topologies_rejected = 0
+        self._rejected_beside = dict.fromkeys(REJECTED_BESIDE_MESHES, 0)
 
     def report(
         self,
@@ -78,9 +78,9 @@ class Reporter:
         coordinate_frame: tuple[str, str],
     ) -> DiagnosticStatus:
         accounts = self._accounts
-        dropped, topologies_refused = accounts.dropped.by_reason(), accounts.topologies_refused.total
+        dropped, topologies_rejected = accounts.dropped.by_reason(), accounts.topologies_rejected.total
         new = {reason: more for reason, count in dropped.items() if (more := count - self._dropped.get(reason, 0))}
-        new_topologies = topologies_refused - self._topologies_refused
+        new_topologies = topologies_rejected - self._topologies_rejected
         values: dict[str, object] = {}
         for mesh, count in sorted(data["received"].items()):
             values[f"received.{mesh}"] = count
@@ -93,7 +93,7 @@ class Reporter:
             "waiting": waiting,
             "dropped": sum(dropped.values()),
             "restarts": accounts.restarts,
-            "topologies_refused": topologies_refused,
+            "topologies_rejected": topologies_rejected,
             "frame_id": coordinate_frame[0],
             "frame_id_by": coordinate_frame[1],
         }
@@ -101,23 +101,23 @@ class Reporter:
             values[f"dropped.{reason}"] = count
         for (mesh, reason), count in sorted(accounts.dropped.by_mesh_and_reason().items()):
             values[f"dropped.{mesh}.{reason}"] = count
-        for (mesh, reason), count in sorted(accounts.topologies_refused.by_mesh_and_reason().items()):
-            values[f"topologies_refused.{mesh}.{reason}"] = count
+        for (mesh, reason), count in sorted(accounts.topologies_rejected.by_mesh_and_reason().items()):
+            values[f"topologies_rejected.{mesh}.{reason}"] = count
         values |= accounts.connections
         for stage, text in percentiles(data["transport_ms"]).items():
             values[f"transport_ms.{stage}"] = text
-        values["last_refusal"] = accounts.log.last
+        values["last_rejection"] = accounts.log.last
         values |= {f"warning.{number}": text for number, text in enumerate([*warnings, *silent], start=1)}
-        self._received, self._dropped, self._topologies_refused = (data["received"], dropped, topologies_refused)
+        self._received, self._dropped, self._topologies_rejected = (data["received"], dropped, topologies_rejected)
         notes = list(warnings)
         if new:
             reasons = listed(f"{reason} {count:,}" for reason, count in sorted(new.items()))
             notes.insert(0, f"{counted(sum(new.values()), 'frame')} dropped ({reasons})")
         if new_topologies:
             notes.insert(0, f"{counted(new_topologies, 'topology', 'topologies')} rejected")
-        for what, name in REFUSED_BESIDE_MESHES.items():
-            before, self._refused_beside[what] = self._refused_beside[what], accounts.connections[name]
-            if new_of_kind := self._refused_beside[what] - before:
+        for what, name in REJECTED_BESIDE_MESHES.items():
+            before, self._rejected_beside[what] = self._rejected_beside[what], accounts.connections[name]
+            if new_of_kind := self._rejected_beside[what] - before:
                 notes.insert(0, f"{counted(new_of_kind, what.removesuffix('s'))} rejected")
         if notes or (silent and came):
             return self._status("frames", DiagnosticStatus.WARN, "; ".join([*notes, *silent]), values)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from hpccd_ros.detect.scene import SceneBuilder
-from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Input, Reason, Rejection
 from hpccd_ros.frames.types import TF, Origin
 from hpccd_ros.params import robot_parameters
 from hpccd_ros.params.table import ROBOT
@@ -99,17 +99,17 @@ class Doubt:
         return all(origins[mesh].of(self.aspect) > self.sent for mesh in self.meshes if mesh in origins)
 
 
-def leaves_unknown(refusal: Refusal) -> bool:
+def leaves_unknown(rejection: Rejection) -> bool:
     """Whether something newer than what is in use was rejected."""
-    return refusal.reason not in GAVE_WAY and refusal.aspect is not Aspect.NOTHING
+    return rejection.reason not in GAVE_WAY and rejection.aspect is not Aspect.NOTHING
 
 
-def text_of(refusal: Refusal) -> str:
+def text_of(rejection: Rejection) -> str:
     """Why stop is true, as a sentence without its full stop."""
-    if refusal.what is Input.JOINT_STATE and refusal.reason is Reason.CONTRADICTED:
-        return f"two publishers on {refusal.mesh} contradict each other"
-    if refusal.reason is Reason.STATIC_MISSING:
-        return f"static mesh {refusal.mesh} has a new topology and no positions yet"
-    if refusal.what in (Input.JOINT_STATE, Input.TRANSFORM):
-        return f"{refusal.what} on {refusal.mesh} rejected: {refusal.reason}"
-    return f"{_ASPECTS[refusal.aspect]} of mesh {refusal.mesh} rejected: {refusal.reason}"
+    if rejection.what is Input.JOINT_STATE and rejection.reason is Reason.CONTRADICTED:
+        return f"two publishers on {rejection.mesh} contradict each other"
+    if rejection.reason is Reason.STATIC_MISSING:
+        return f"static mesh {rejection.mesh} has a new topology and no positions yet"
+    if rejection.what in (Input.JOINT_STATE, Input.TRANSFORM):
+        return f"{rejection.what} on {rejection.mesh} rejected: {rejection.reason}"
+    return f"{_ASPECTS[rejection.aspect]} of mesh {rejection.mesh} rejected: {rejection.reason}"

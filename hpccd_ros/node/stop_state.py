@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from hpccd_ros.base.clocks import CLOCK_ERROR, Clocks, ClockWatch
-from hpccd_ros.frames.drops import Aspect, Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Reason, Rejection
 from hpccd_ros.frames.types import ALWAYS, OUTDATED, UNKNOWN_TIME, Origin
 from hpccd_ros.node.stop_doubts import Doubt, Source, WatchedScene, leaves_unknown, text_of
 
@@ -30,7 +30,7 @@ class Cause(StrEnum):
     INACTIVE = "inactive"  # the node does not detect
     UNANSWERED = "unanswered"  # no step has a result yet
     NEAR = "near"
-    REFUSED = "refused"  # a message was rejected
+    REJECTED = "rejected"  # a message was rejected
     FAILED = "failed"  # a detection
     SILENT = "silent"  # no recent result
     HELD_UP = "held_up"  # the thread that publishes stop did not run
@@ -154,15 +154,15 @@ class StopState:
         if larger:
             self._set_cause(Cause.UNANSWERED, f"no step has a result since stop_distance became {distance:g}")
 
-    def refused(self, refusal: Refusal) -> None:
+    def rejected(self, rejection: Rejection) -> None:
         """The meshes that the message is about are unknown until a valid message about them is in use."""
-        if refusal.reason is Reason.DETECTION_FAILED:
+        if rejection.reason is Reason.DETECTION_FAILED:
             self.failed("the detection of the last step failed")
             return
         with self._condition:
-            if leaves_unknown(refusal):
-                source = Source(refusal.what, refusal.mesh, refusal.aspect)
-                self._doubt(Cause.REFUSED, source, refusal.sent, text_of(refusal))
+            if leaves_unknown(rejection):
+                source = Source(rejection.what, rejection.mesh, rejection.aspect)
+                self._doubt(Cause.REJECTED, source, rejection.sent, text_of(rejection))
 
     def failed(self, text: str) -> None:
         """A step was not answered: earlier frames say nothing about the present."""
@@ -241,9 +241,9 @@ class StopState:
                 return Why(cause, doubt.text)
         if self._outdated:
             text = f"a newer message about the position of mesh {self._outdated} was rejected, or is not in use yet"
-            return Why(Cause.REFUSED, text)
+            return Why(Cause.REJECTED, text)
         for name, text in self._robots.items():
-            return Why(Cause.REFUSED, f"robot {name}: {text}")
+            return Why(Cause.REJECTED, f"robot {name}: {text}")
         if text := self._ages.why(self._clocks.steady()):
             return Why(Cause.CLOCKS, text)
         age = self._clocks.system() - self._oldest

@@ -15,7 +15,7 @@ from hpccd_core import Cancelled
 from hpccd_ros.detect.core import CORE_ERRORS
 from hpccd_ros.detect.nearness import Nearness
 from hpccd_ros.detect.scene import SceneBuilder
-from hpccd_ros.frames.drops import Refusal
+from hpccd_ros.frames.drops import Rejection
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.middleware import qos, topic_names
 from hpccd_ros.node.configuration import Configuration
@@ -92,7 +92,7 @@ class StopWatch:
     """Publishes stop for a configured ``node`` with parameter stop_distance. busy: whether a frame is being processed.
 
     The life cycle calls `begin` and `end`, the detection thread `first` and `look`, the executor `received` and
-    `robots`, any thread `refused`.
+    `robots`, any thread `rejected`.
     """
 
     def __init__(self, node: GuardedLifecycleNode, configuration: Configuration, busy: Callable[[], bool]) -> None:
@@ -147,8 +147,8 @@ class StopWatch:
         self._nearness_ms = 1e3 * (time.perf_counter() - began)
         self._state.answered(near, distance, end.origins)
 
-    def refused(self, refusal: Refusal) -> None:
-        self._state.refused(refusal)
+    def rejected(self, rejection: Rejection) -> None:
+        self._state.rejected(rejection)
 
     def received(self, kind: str, name: str, info: Mapping[str, Any]) -> None:
         """A message of this kind was received; name: of its mesh or topic."""

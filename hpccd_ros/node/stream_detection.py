@@ -95,7 +95,7 @@ class StreamDetection:
         stop = self._stop
         if stop is not None:
             stop.begin(self._builder)
-            self._accounts.on_refused = stop.refused
+            self._accounts.on_rejected = stop.rejected
             self._accounts.on_received = stop.received
         thread = DetectionThread(
             StepDetector(self._builder, self._configuration.options),

@@ -16,7 +16,7 @@ from shape_msgs.msg import Mesh
 from visualization_msgs.msg import Marker
 
 from hpccd_ros.base.quoting import counted, listed, nearest
-from hpccd_ros.frames.drops import Reason, Refusal
+from hpccd_ros.frames.drops import Reason, Rejection
 from hpccd_ros.middleware import graph, message_types, qos, topic_names
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.unheard_topics import UnheardTopics
@@ -125,7 +125,7 @@ class UnknownMeshWatch:
 
         def count(data: bytes) -> None:
             self._accounts.metrics.frame_received(name, None)
-            self._accounts.refused(Refusal(name, Reason.UNKNOWN_MESH))
+            self._accounts.rejected(Rejection(name, Reason.UNKNOWN_MESH))
 
         # Best effort is compatible with every publisher.
         return self._node.create_subscription(message, topic, count, qos.vertices("best_effort", 10), raw=True)

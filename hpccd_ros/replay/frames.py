@@ -7,7 +7,7 @@ from hpccd_ros.bag.decode import checked_type, make_decoder
 from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames import taken_inputs
 from hpccd_ros.frames.arrivals import SequenceWatch
-from hpccd_ros.frames.drops import Input, RefusalCounter
+from hpccd_ros.frames.drops import Input, RejectionCounter
 from hpccd_ros.frames.taken_inputs import NEW_PUBLISHER, SEVERAL_PUBLISHERS
 from hpccd_ros.frames.types import Outcome, SceneFrame
 from hpccd_ros.frames.welding import Welding
@@ -25,7 +25,7 @@ PATIENCE = 16
 class FrameSource:
     """Pushes recorded messages into a pipeline like that of the node.
 
-    ordered: they arrive in the order in which the node took them. refused: rejected messages, by reason, counted as in
+    ordered: they arrive in the order in which the node took them. rejected: rejected messages, by reason, counted as in
     the node; transforms by topic.
     """
 
@@ -34,7 +34,7 @@ class FrameSource:
         self._settings = setup.settings
         # Otherwise the order of messages across topics may differ between recorder and node.
         self._patience = 1 if ordered else 4
-        self.refused = {what: RefusalCounter() for what in Input}
+        self.rejected = {what: RejectionCounter() for what in Input}
         self._decoders = {
             name: _checked_bytes(topics[name]) if kind in topic_names.WHOLE else make_decoder(topics[name])
             for name, (_, kind) in setup.roles.items()
@@ -117,13 +117,13 @@ class FrameSource:
         for topic, moved in self._by_joints.items():
             for message in self._recent[topic]:
                 joint_messages.fill(moved, message, topic)
-        outcome.refusals += before.stop().refusals
+        outcome.rejections += before.stop().rejections
         outcome += self._retried([])
         return outcome
 
     def _counted(self, outcome: Outcome) -> list[SceneFrame]:
-        for refusal in outcome.refusals:
-            self.refused[refusal.what].count(refusal)
+        for rejection in outcome.rejections:
+            self.rejected[rejection.what].count(rejection)
         return outcome.frames
 
     def _push_mesh(self, mesh, kind, decoded, message, flags) -> Outcome:
@@ -142,15 +142,15 @@ class FrameSource:
                 welding=self._weldings[message.topic],
             )
         except InvalidMessageError as error:
-            return Outcome(refusals=[error.refusal(mesh, mesh_inputs.INPUTS[kind])])
+            return Outcome(rejections=[error.rejection(mesh, mesh_inputs.INPUTS[kind])])
         if kind != "topology":
             new_publisher = watch.notice()
         if flags is not None:
             new_publisher = bool(flags & NEW_PUBLISHER)
         return self._pipeline.push(mesh, checked, new_publisher)
 
-    def _retried(self, refusals) -> Outcome:
-        outcome = Outcome(refusals=refusals)
+    def _retried(self, rejections) -> Outcome:
+        outcome = Outcome(rejections=rejections)
         for part in self._pipeline.retry():
             outcome += part
         return outcome

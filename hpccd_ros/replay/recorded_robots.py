@@ -50,14 +50,14 @@ def _robot(recording, name: str, values: Mapping[str, Any], texts: Mapping[str, 
     time, ns, at which it was first received."""
     semantics = _semantics(recording, name, values)
     robots: list[tuple[Robot, int]] = []
-    refused: RobotError | MeshFileError | None = None
+    rejected: RobotError | MeshFileError | None = None
     for text, came in texts.items():
         try:
             with tempfile.TemporaryDirectory() as folder:
                 find = _resolver(recording, name, values, text, Path(folder))
                 robots.append((robot_files.robot_of(name, values, text, semantics, find), came))
         except (RobotError, MeshFileError) as error:
-            refused = error
+            rejected = error
     if len(robots) > 1:
         at = seconds(robots[1][1] - next(recording.records()).message.log_time)
         raise RobotError(
@@ -65,8 +65,8 @@ def _robot(recording, name: str, values: Mapping[str, Any], texts: Mapping[str, 
             f"and after that: `hpccd cut {recording.path} --to {at} -o before.mcap`, "
             f"`hpccd cut {recording.path} --from {at} -o after.mcap`"
         )
-    if refused is not None and not robots:
-        raise refused
+    if rejected is not None and not robots:
+        raise rejected
     return robots[0][0]
 
 

@@ -76,10 +76,10 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
     info = recording.info or {}
     try:
         if parameter_file:
-            where, refused = f"--params {parameter_file}", UserError
+            where, rejected = f"--params {parameter_file}", UserError
             given = read_parameters(parameter_file)
         else:
-            where, refused = f"{recording.path}: the stored parameters", RecordingError
+            where, rejected = f"{recording.path}: the stored parameters", RecordingError
             given = _stored(recording, info)
         settings, meshes = values.checked(given)
         if not settings["meshes"] and not settings["robots"]:
@@ -91,7 +91,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         if parameter_file:  # what is stored may be of another version
             without_effect = unknown.check(without_effect, settings)
     except ParameterError as error:
-        raise refused(printable(f"{where}: {error}")) from error
+        raise rejected(printable(f"{where}: {error}")) from error
     of_robots = settings[ROBOT]
     by_role = _by_role(recording, info, recorded_topics.types_by_role(meshes, of_robots))
     joint_topics, described = robot_parameters.joint_topics(of_robots), robot_parameters.topics(of_robots).values()
@@ -123,7 +123,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
     try:
         scene_parameters.check(settings, meshes, robots)
     except ParameterError as error:
-        raise refused(printable(f"{where}: {error}")) from error
+        raise rejected(printable(f"{where}: {error}")) from error
     return ReplaySetup(
         settings,
         meshes,

@@ -297,7 +297,7 @@ def _print_distances(distances) -> None:
 
 
 def _print_losses(replay) -> None:
-    for what, counter in replay.source.refused.items():
+    for what, counter in replay.source.rejected.items():
         for (mesh, reason), count in sorted(counter.by_mesh_and_reason().items()):
             print(f"  {count} {what} of {mesh} not used: {reason}{_HINTS.get(reason, '').format(mesh=mesh)}")
     for topic, count in sorted(replay.not_taken.items()):

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hpccd_core.rigid.transform import Rigid
-from hpccd_ros.frames.drops import Aspect, Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Reason, Rejection
 from hpccd_ros.frames.follower import Followed
 from hpccd_ros.frames.standstill import Standstill
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
@@ -68,7 +68,7 @@ class JointFrames:
         self._waiting.append(_Asked(stamp, received, new_publisher))
 
     def retry(self, transforms: TransformBuffer) -> Followed:
-        refusals: list[Refusal] = []
+        rejections: list[Rejection] = []
         times: list[list[tuple[str, MeshFrame, bool]]] = []
         while self._waiting:
             asked = self._waiting[0]
@@ -81,16 +81,16 @@ class JointFrames:
                     break
                 lacking = isinstance(error, NoJointStateError)
                 reason = Reason.NO_JOINT_STATE if lacking else Reason.NO_TRANSFORM
-                refusals += self._refused(reason, asked.awaited, Aspect.NOTHING)  # no message was rejected
+                rejections += self._rejected(reason, asked.awaited, Aspect.NOTHING)  # no message was rejected
             except RobotError as error:
-                refusals += self._refused(Reason.OUT_OF_RANGE, str(error), Aspect.PLACE)
+                rejections += self._rejected(Reason.OUT_OF_RANGE, str(error), Aspect.PLACE)
             else:
                 times.append(frames)
                 self._standstill.ends()
             self._waiting.popleft()
         if self._waiting:
             self._standstill.waits()
-        return Followed(refusals, times)
+        return Followed(rejections, times)
 
     def latest(self, transforms: TransformBuffer) -> list[int | None]:
         try:
@@ -105,10 +105,10 @@ class JointFrames:
             text = f"{error}; {self._remedy}"
             raise NoTransformError(text, error.final, error.connected, error.source) from error
 
-    def clear(self, reason: Reason) -> list[Refusal]:
-        refusals = [Refusal(name, reason) for _ in self._waiting for name in self.names]
+    def clear(self, reason: Reason) -> list[Rejection]:
+        rejections = [Rejection(name, reason) for _ in self._waiting for name in self.names]
         self._waiting.clear()
-        return refusals
+        return rejections
 
     def forget_future(self, stamp: int) -> None:
         self._history.forget_future(stamp)
@@ -160,7 +160,10 @@ class JointFrames:
         """For a missing transform of the base."""
         return f"publish that, or give parameter robot.{self._robot.name}.pose"
 
-    def _refused(self, reason: Reason, text: str, aspect: Aspect) -> list[Refusal]:
+    def _rejected(self, reason: Reason, text: str, aspect: Aspect) -> list[Rejection]:
         """The text only once, because it is about the robot, not a link."""
         first, *others = self.names
-        return [Refusal(first, reason, text, aspect=aspect), *(Refusal(name, reason, aspect=aspect) for name in others)]
+        return [
+            Rejection(first, reason, text, aspect=aspect),
+            *(Rejection(name, reason, aspect=aspect) for name in others),
+        ]

@@ -115,7 +115,7 @@ class _Builder:
         self._parser = expat.ParserCreate("UTF-8")
         self._parser.StartElementHandler = self._start
         self._parser.EndElementHandler = self._end
-        self._parser.StartDoctypeDeclHandler = self._refuse_document_type
+        self._parser.StartDoctypeDeclHandler = self._reject_document_type
 
     def built(self, text: str) -> Element:
         try:
@@ -146,7 +146,7 @@ class _Builder:
     def _end(self, tag: str) -> None:
         self._open.pop()
 
-    def _refuse_document_type(self, *_: object) -> None:
+    def _reject_document_type(self, *_: object) -> None:
         raise RobotError(
             f"{self._document}, line {self._parser.CurrentLineNumber}: has a document type (<!DOCTYPE>), which could "
             "define entities; remove it"

@@ -24,7 +24,7 @@ def write_mcap(scene: Scene, path: str | Path, rate: float, compression: str = "
     """Write all frames, `rate` a second, as `hpccd record` would have recorded them: topologies and vertices, of robots
     the description and the joint states.
 
-    Raises FileExistsError where `path` exists, OSError where the disk refuses, LookupError where the package hpccd is
+    Raises FileExistsError where `path` exists, OSError where the disk rejects, LookupError where the package hpccd is
     not installed.
     """
     info = {

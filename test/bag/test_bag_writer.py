@@ -117,7 +117,7 @@ def test_definitions_hold_every_nested_type():
     assert "MSG: std_msgs/Header\n" in text and "MSG: builtin_interfaces/Time\n" in text
 
 
-def test_unknown_type_is_refused_before_anything_is_written(tmp_path):
+def test_unknown_type_is_rejected_before_anything_is_written(tmp_path):
     writer = BagWriter(tmp_path / "bag.mcap")
     with pytest.raises(LookupError, match="nowhere_msgs/msg/Nothing not found"):
         writer.add_topic(Topic("/x", "nowhere_msgs/msg/Nothing", []))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A disk that refuses ends no recorder: what was whole stays, what was lost is counted, and it goes on with space."""
+"""A disk that rejects ends no recorder: what was whole stays, what was lost is counted, and it goes on with space."""
 
 import contextlib
 import random
@@ -18,7 +18,7 @@ TEXT = random.Random(6).randbytes(500).hex()  # compresses by half at most
 
 @contextlib.contextmanager
 def _largest_file(size):
-    """The system refuses to let any file of this process grow beyond `size` bytes, as a full disk does."""
+    """The system lets no file of this process grow beyond `size` bytes, as a full disk does."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     try:

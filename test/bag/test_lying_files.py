@@ -52,7 +52,7 @@ def _special_files(folder):
 
 
 @pytest.mark.timeout(60)  # it was a hang
-def test_what_is_no_file_is_refused_at_once(tmp_path):
+def test_what_is_no_file_is_rejected_at_once(tmp_path):
     (tmp_path / "in").mkdir()
     for path in (*_special_files(tmp_path / "in"), tmp_path / "in"):
         for command in (

@@ -165,7 +165,7 @@ def test_what_has_to_be_unpacked_first(sound_bags, tmp_path, whole):
     folder = _by_rosbags(sound_bags, tmp_path / "run", StoragePlugin.MCAP, CompressionMode.FILE)
     (tmp_path / "parameters.yaml").write_text(PARAMETERS)
     (packed,) = folder.glob("*.mcap.zstd")
-    said = _refused(folder if whole else packed)
+    said = _rejected(folder if whole else packed)
     command = said.partition("unpack it: `")[2].removesuffix("`")
     assert command == f"zstd -d {folder}/*.mcap.zstd" if whole else f"zstd -d {packed}"
     if shutil.which("zstd") is None:
@@ -184,7 +184,7 @@ def test_sqlite3_is_named_with_the_command_that_converts(sound_bags, tmp_path, m
         f"ros2 bag convert -i {folder} -o convert.yaml`"
     )
     for path in [folder, *([] if mode else folder.glob("*.db3"))]:
-        said = _refused(path)
+        said = _rejected(path)
         assert "an sqlite3 recording" in said and said.endswith(command), said
     if mode:
         return
@@ -200,7 +200,7 @@ def test_recordings_without_a_message_of_ros_2(bag, tmp_path):
     bag = dataclasses.replace(_foreign(bag), profile="ros1")
     bag.channels = bag.channels[-5:]
     bag.messages = [message for message in bag.messages if message.channel_id >= 90]
-    said = _refused(bag.write(tmp_path / "x.mcap"), doctor=2)
+    said = _rejected(bag.write(tmp_path / "x.mcap"), doctor=2)
     assert "has no ROS 2 messages (MCAP profile 'ros1'; topics: /log (encoding 'json')" in said, said
 
 
@@ -244,8 +244,8 @@ def _check(path, expected, skipped=(), options=()):
         assert all(f"{topic} (" in words for topic in skipped), words
 
 
-def _refused(path, doctor=2):
-    """The sentence with which all commands refuse it."""
+def _rejected(path, doctor=2):
+    """The sentence with which all commands reject it."""
     examined, replayed = hpccd("doctor", path), hpccd("replay", path)
     assert (examined.status, replayed.status) == (doctor, 2), (examined, replayed)
     said = replayed.err.removeprefix("hpccd replay: ")

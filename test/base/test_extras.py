@@ -14,8 +14,8 @@ def test_what_is_installed_is_imported():
 
 
 def test_what_is_missing_is_named_with_its_extra():
-    with pytest.raises(UserError) as refused:
+    with pytest.raises(UserError) as rejected:
         extras.require("no_such_package.part", "cluster", "many recordings at once")
-    text = str(refused.value)
+    text = str(rejected.value)
     assert text.startswith("many recordings at once needs the Python package no_such_package (")
     assert "pip install '.[cluster]'" in text

@@ -46,9 +46,9 @@ def test_an_earlier_file_is_replaced_with_its_permissions(tmp_path):
 def test_an_earlier_file_is_not_replaced_unless_asked_for(tmp_path):
     path = tmp_path / "run.mcap"
     path.write_text("old")
-    with pytest.raises(FileExistsError) as refused, whole_file(path):
+    with pytest.raises(FileExistsError) as rejected, whole_file(path):
         pytest.fail("nothing is written")
-    assert refused.value.filename == str(path)
+    assert rejected.value.filename == str(path)
     assert path.read_text() == "old" and _names(tmp_path) == ["run.mcap"]
 
 
@@ -60,10 +60,10 @@ def test_nor_is_one_that_was_made_meanwhile(tmp_path, monkeypatch, links):
     if not links:
         monkeypatch.setattr(module.os, "link", no_links)
     path = tmp_path / "run.mcap"
-    with pytest.raises(FileExistsError) as refused, whole_file(path) as draft:
+    with pytest.raises(FileExistsError) as rejected, whole_file(path) as draft:
         draft.write_text("new")
         path.write_text("of another process")
-    assert refused.value.filename == str(path)
+    assert rejected.value.filename == str(path)
     assert path.read_text() == "of another process" and _names(tmp_path) == ["run.mcap"]
     path.unlink()
     with whole_file(path) as draft:

@@ -37,10 +37,10 @@ def run(args) -> lab.Report:
     report = lab.begin(args)[0]
     report.note(measure.NOTE)
     tiers = lab.listed("--tiers", args.tiers, ACCURACIES)
-    backends, refused = command.usable("backend", args.backend, lab.BACKENDS)
-    lab.skipped(report, "backend", refused)
-    sets, refused = command.usable("simd", args.simd, SIMD)
-    lab.skipped(report, "instruction set", refused)
+    backends, rejected = command.usable("backend", args.backend, lab.BACKENDS)
+    lab.skipped(report, "backend", rejected)
+    sets, rejected = command.usable("simd", args.simd, SIMD)
+    lab.skipped(report, "instruction set", rejected)
     if "distance" in parts:
         _measure_distance(report, tiers, backends, sets, args)
     if "sweeps" in parts and args.sweep_queries > 0:

@@ -84,9 +84,9 @@ def require_backend(args, **others) -> None:
     """UserError if --backend does not work here, or does not support --arrays device."""
     if getattr(args, "arrays", "host") == "device" and (args.backend != "gpu" or getattr(args, "peer", None)):
         raise UserError("--arrays device: needs --backend gpu, and no --peer: only a device reads them there")
-    _, refused = usable("backend", [args.backend], **others)
-    if refused:
-        raise UserError(f"--backend {args.backend}: {refused[args.backend]}")
+    _, rejected = usable("backend", [args.backend], **others)
+    if rejected:
+        raise UserError(f"--backend {args.backend}: {rejected[args.backend]}")
 
 
 def compare(

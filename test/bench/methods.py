@@ -35,9 +35,9 @@ def configure(parser):
 def run(args) -> lab.Report:
     methods = lab.listed("--methods", args.methods, METHODS)
     sets = lab.listed("--simd", args.simd, SIMD) if args.simd else _core.simd_levels()
-    sets, refused = lab.usable("simd", sets, accuracy=args.accuracy)
+    sets, rejected = lab.usable("simd", sets, accuracy=args.accuracy)
     result, sources = lab.begin(args)
-    lab.skipped(result, "instruction set", refused)
+    lab.skipped(result, "instruction set", rejected)
     threads = args.threads or lab.cores()
     variants = {"default": {}} | {m: {"method": m} for m in methods}
     variants |= {simd: {"simd": simd} for simd in sets}

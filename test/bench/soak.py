@@ -428,11 +428,11 @@ class Soak:
                 failure(f"{sent} messages for {reason} were sent, the node counted {dropped[reason]}")
             known_otherwise -= max(0, sent - dropped[reason])
         if known_otherwise < 0:
-            failure(f"{-known_otherwise} wrong messages were not refused: {dict(load.wrong_sent)}")
+            failure(f"{-known_otherwise} wrong messages were not rejected: {dict(load.wrong_sent)}")
         for reason, sent in load.topologies_wrong.items():
-            counted = status.count(f"topologies_refused.{load.victim}.{reason}")
+            counted = status.count(f"topologies_rejected.{load.victim}.{reason}")
             if counted > sent:
-                failure(f"{sent} topologies for {reason} were sent, the node refused {counted}")
+                failure(f"{sent} topologies for {reason} were sent, the node rejected {counted}")
         if self.received(STRIP) > self.sent_by_restarted():
             failure(f"{STRIP}: {self.received(STRIP)} messages counted, {self.sent_by_restarted()} sent")
         if failures := status.count("failures", "detection"):

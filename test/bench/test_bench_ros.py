@@ -116,7 +116,7 @@ def test_a_robot_beside_a_cloth(tmp_path):
     assert "arm-and-cloth at 10 frames a second" in said
 
 
-def test_a_backend_that_is_not_here_is_refused(tmp_path):
+def test_a_backend_that_is_not_here_is_rejected(tmp_path):
     if "gpu" in hc.backends():
         pytest.skip("a GPU is here")
     status, _, said = bench(tmp_path, "robot", "--backend", "gpu")

@@ -233,14 +233,14 @@ def test_wrong_use_is_explained(bench, capsys, arguments, text):
     assert status == 2 and result is None and text in capsys.readouterr().err
 
 
-def test_an_option_that_a_subject_does_not_use_is_refused(bench, capsys):
+def test_an_option_that_a_subject_does_not_use_is_rejected(bench, capsys):
     for subject, option in (("memory", "--steps"), ("gpu", "--steps"), ("soak", "--threads")):
         with pytest.raises(SystemExit):
             bench(subject, option, "2")
         assert f"unrecognized arguments: {option}" in capsys.readouterr().err
 
 
-def test_steps_without_a_motion_are_refused_first(tmp_path):
+def test_steps_without_a_motion_are_rejected_first(tmp_path):
     none = sources.Source("none", 3, lambda k: None)
     parser = argparse.ArgumentParser()
     command.configure(parser, ("none",), steps=2)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arrays to messages and back, and what is refused before it is sent."""
+"""Arrays to messages and back, and what is rejected before it is sent."""
 
 import math
 
@@ -48,7 +48,7 @@ def test_vertices_come_back_in_their_precision(dtype):
         (dict(stamp_ns=-1), ValueError, "stamp_ns: must lie in"),
     ],
 )
-def test_a_topology_that_is_refused(arguments, error, text):
+def test_a_topology_that_is_rejected(arguments, error, text):
     with pytest.raises(error, match=text):
         client.topology_message(**{"faces": FACES, "n_vertices": 6, **arguments})
 
@@ -70,7 +70,7 @@ def test_a_topology_that_is_refused(arguments, error, text):
         (dict(frame_id=None), TypeError, "frame_id: expected a string"),
     ],
 )
-def test_vertices_that_are_refused(arguments, error, text):
+def test_vertices_that_are_rejected(arguments, error, text):
     with pytest.raises(error, match=text):
         client.vertices_message(**{"vertices": VERTICES, "stamp_ns": 0, **arguments})
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The request that asks how far a motion may go, and its answer: what is refused before it is sent or used."""
+"""The request that asks how far a motion may go, and its answer: what is rejected before it is sent or used."""
 
 import math
 
@@ -55,7 +55,7 @@ def test_what_the_node_knows_is_left_out():
         (dict(time_limit=-1.0), ValueError, "time_limit: "),
     ],
 )
-def test_what_is_refused_before_it_is_sent(arguments, error, text):
+def test_what_is_rejected_before_it_is_sent(arguments, error, text):
     with pytest.raises(error, match=text):
         client.collision_free_step_request(**{"start": START, "end": END, **arguments})
 
@@ -67,9 +67,9 @@ def test_the_step_in_an_answer(step):
 
 @pytest.mark.parametrize("step", [0.0, 1.0, math.nan])
 def test_no_step_where_the_node_computed_none(step):
-    refused = Detect.Response(success=False, message="busy: try again later", collision_free_step=step)
+    rejected = Detect.Response(success=False, message="busy: try again later", collision_free_step=step)
     with pytest.raises(RuntimeError, match="the node did not answer: busy: try again later"):
-        client.collision_free_step_from_response(refused)
+        client.collision_free_step_from_response(rejected)
 
 
 @pytest.mark.parametrize("step", [math.nan, -0.1, 1.1, math.inf])

@@ -102,7 +102,7 @@ def test_unknown_command(hpccd):
         ["scene", "two-triangles", "--publish"],
     ],
 )
-def test_another_rmw_implementation_is_refused_before_rcl_ends_the_process(hpccd, monkeypatch, arguments):
+def test_another_rmw_implementation_is_rejected_before_rcl_ends_the_process(hpccd, monkeypatch, arguments):
     monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_nobody_cpp")
     done = hpccd(*arguments)
     assert done.returncode == 2 and "RMW_IMPLEMENTATION: 'rmw_nobody_cpp' is not installed here" in done.stderr

@@ -109,7 +109,7 @@ def test_a_full_disk_leaves_no_part_of_a_new_file(folder, case):
 
 
 @pytest.mark.parametrize("case", NEW)
-def test_an_earlier_file_is_refused(hpccd, folder, case):
+def test_an_earlier_file_is_rejected(hpccd, folder, case):
     arguments, name = NEW[case]
     before = _earlier(folder, name)
     done = hpccd(*arguments)

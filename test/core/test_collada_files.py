@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""DAE files: numbering, units, nodes, what is refused; as RViz shows them."""
+"""DAE files: numbering, units, nodes, what is rejected; as RViz shows them."""
 
 import io
 import sys
@@ -177,7 +177,7 @@ ENTITIES = '<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">' + "".joi
         "hole lists count large-index array-count stride entities"
     ).split(),
 )
-def test_bad_files_are_refused(load, text, why):
+def test_bad_files_are_rejected(load, text, why):
     with pytest.raises(MeshFileError, match=why) as caught:
         load(text)
     assert len(str(caught.value)) < 800

@@ -122,7 +122,7 @@ def test_mesh_name_twice(scene):
         scene.add_mesh("cloth", FACES)
 
 
-def test_a_refused_mesh_leaves_the_scene_as_it_was(scene):
+def test_a_rejected_mesh_leaves_the_scene_as_it_was(scene):
     with pytest.raises(ValueError):
         scene.add_mesh("ball", [[0, 1, 9]], n_vertices=3)
     assert scene.mesh_names == ["cloth"] and scene.n_vertices == 4 and scene.n_faces == 2
@@ -205,7 +205,7 @@ def test_choices_are_listed(scene):
         hc.Detector(scene, accuracy="precise")
 
 
-def test_unusable_backend_is_refused(scene):
+def test_unusable_backend_is_rejected(scene):
     unusable = {"hybrid", "gpu"} - set(hc.backends())
     if not unusable:
         pytest.skip("every backend can be used here")
@@ -283,7 +283,7 @@ BAD_STEPS = [
 @pytest.mark.parametrize(("bad", "error", "text"), BAD_STEPS)
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.filterwarnings("error")
-def test_a_refused_step_does_not_count(detector, bad, error, text, dtype):
+def test_a_rejected_step_does_not_count(detector, bad, error, text, dtype):
     start, moved = VERTICES.astype(dtype), VERTICES[::-1].astype(dtype)
     with pytest.raises(error, match=f"(?i)^{text}"):
         detector.step(bad)

@@ -221,7 +221,7 @@ def test_intersections_one_sees(points, truth):
 
 
 @pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf, np.zeros(3)])
-def test_bad_distances_are_refused(bad):
+def test_bad_distances_are_rejected(bad):
     with pytest.raises(ValueError, match="distance"):
         oracle.separation_vertex_face(np.zeros((1, 8, 3)), bad)
 

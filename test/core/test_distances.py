@@ -170,7 +170,7 @@ def test_they_agree_with_proximity_and_intersections(generate):
         assert len(below.vf) + len(below.ee) == 0
 
 
-def test_bad_positions_are_refused():
+def test_bad_positions_are_rejected():
     detector = hc.Detector(random_scenes.single_mesh(np.random.default_rng(84)).scene(), backend="cpu")
     with pytest.raises(ValueError, match="vertices"):
         detector.distances(np.zeros((3, 3)))

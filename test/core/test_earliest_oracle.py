@@ -77,7 +77,7 @@ def test_single_pairs_that_graze(kind):
         ({"minimum_separation": [np.inf]}, "minimum_separation"),
     ],
 )
-def test_bad_arguments_are_refused(change, text):
+def test_bad_arguments_are_rejected(change, text):
     good = {"vertices_t0": np.zeros((1, 4, 3)), "vertices_t1": np.zeros((1, 4, 3))}
     with pytest.raises(ValueError, match=text):
         oracle.earliest_contacts(**good | change, faces_per_mesh=[[[1, 2, 3]]])

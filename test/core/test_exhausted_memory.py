@@ -76,9 +76,9 @@ def run(program):
 
 
 def test_too_many_threads():
-    made, refused = run(NO_THREADS)
+    made, rejected = run(NO_THREADS)
     assert made == "made"
-    assert refused.startswith("threads: the system starts ") and "of 300" in refused and "ask for fewer" in refused
+    assert rejected.startswith("threads: the system starts ") and "of 300" in rejected and "ask for fewer" in rejected
 
 
 def test_no_memory_in_threads_that_have_not_thrown_yet():

@@ -181,7 +181,7 @@ def test_a_late_toc_breaks_the_promise_of_conservative_only_beyond_the_true_one(
 
 
 @pytest.mark.parametrize("option", ["--accuracy", "--question"])
-def test_unknown_names_are_refused(option, capsys):
+def test_unknown_names_are_rejected(option, capsys):
     with pytest.raises(SystemExit):
         command.main([option, "precise"])
     assert "choose from" in capsys.readouterr().err

@@ -135,7 +135,7 @@ def test_nothing_there():
     assert hc.Detector(hc.Scene(), backend="cpu").intersections(np.empty((0, 3))).ef.shape == (0, 3)
 
 
-def test_bad_positions_are_refused():
+def test_bad_positions_are_rejected():
     detector = detector_of(random_scenes.single_mesh(np.random.default_rng(78)))
     for bad in (np.zeros((3, 3)), np.full((detector.n_vertices, 3), np.inf)):
         with pytest.raises(ValueError, match="vertices"):

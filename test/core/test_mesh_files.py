@@ -167,7 +167,7 @@ def test_corners_that_repeat_stay(load, direction):
             turned = polygon[first:] + polygon[:first]
             vertices, faces = load("m.obj", (variants._v(turned) + variants._f([range(n)])).encode())
             assert_covers(vertices, list(range(n)), [tuple(face) for face in faces.tolist()])
-    # Ear clipping by itself refuses this one in one of the directions.
+    # Ear clipping by itself rejects this one in one of the directions.
     corners = [[11, -23, 14], [10, -20, 12], [8, -20, 4], [7, -14, 4], [7, -14, 4], [5, -5, 2], [4, -2, 0], [7, 4, 16]]
     vertices, faces = load("m.obj", (variants._v(corners[::direction]) + variants._f([range(8)])).encode())
     assert_covers(vertices, list(range(8)), [tuple(face) for face in faces.tolist()])
@@ -201,7 +201,7 @@ def length_of_list(form, length):
     return data.replace(struct.pack(f"{FORMS[form]}d", 3), struct.pack(f"{FORMS[form]}d", length))
 
 
-REFUSED = {
+REJECTED = {
     **{
         f"lfs{suffix}": (LFS, "is a Git LFS pointer, not the mesh itself; run git lfs pull")
         for suffix in (".obj", ".ply", ".stl", ".dae")
@@ -285,9 +285,9 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("name", REFUSED)
+@pytest.mark.parametrize("name", REJECTED)
 def test_errors_say_what_the_file_is(load, capfd, name):
-    data, why = REFUSED[name]
+    data, why = REJECTED[name]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         with pytest.raises(hc.MeshFileError, match=rf"/{name}: .*({why})") as caught:
@@ -297,7 +297,7 @@ def test_errors_say_what_the_file_is(load, capfd, name):
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_any_torn_ply_is_read_or_refused(load, form):
+def test_any_torn_ply_is_read_or_rejected(load, form):
     """Each length of a file with all kinds of rows: no other error, and no other vertices."""
     elements, _ = variants._ply_elements()["mixed-and-more"]
     data = ply(form, elements)
@@ -311,7 +311,7 @@ def test_any_torn_ply_is_read_or_refused(load, form):
         assert form == "ascii" and np.array_equal(vertices, whole[0]) and np.array_equal(faces, whole[1])
 
 
-def test_any_changed_file_is_read_or_refused():
+def test_any_changed_file_is_read_or_rejected():
     """Bytes at random, words and numbers that Python or numpy read in their own way: no other error, no warning."""
     rng = np.random.default_rng(5)
     odd = [b"nan", b"inf", b"1e999", b"-1", b"1_0", b"9" * 5000, b"1e30", b"", b"0x1", b"\xff", b"0.5", b"\\", b"#"]

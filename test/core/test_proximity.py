@@ -209,13 +209,13 @@ def test_nothing_there():
 
 
 @pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf])
-def test_bad_distances_are_refused(bad):
+def test_bad_distances_are_rejected(bad):
     detector = detector_of(random_scenes.single_mesh(np.random.default_rng(64)))
     with pytest.raises(ValueError, match="distance"):
         detector.proximity(np.zeros((detector.n_vertices, 3)), bad)
 
 
-def test_bad_positions_are_refused():
+def test_bad_positions_are_rejected():
     detector = detector_of(random_scenes.single_mesh(np.random.default_rng(65)))
     for bad, error in (
         (np.zeros((3, 3)), ValueError),

@@ -74,6 +74,6 @@ def test_sample_of_published_contacts(data_folder, scene):
 
 
 @pytest.mark.parametrize("bad", [np.zeros((3, 8)), np.zeros((1, 4, 3)), np.full((1, 8, 3), np.nan)])
-def test_bad_queries_are_refused(bad):
+def test_bad_queries_are_rejected(bad):
     with pytest.raises(ValueError, match="queries"):
         oracle.vertex_face(bad)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where results lie and which stream is meant: what is refused, in words that name the argument and the remedy."""
+"""Where results lie and which stream is meant: what is rejected, in words that name the argument and the remedy."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def no_gpu():
 
 @pytest.fixture
 def as_if_there_were_a_gpu(monkeypatch):
-    """For what is refused before anybody looks there."""
+    """For what is rejected before anybody looks there."""
     from hpccd_core import detector
 
     monkeypatch.setattr(detector, "backends", lambda: ["cpu", "gpu", "hybrid"])

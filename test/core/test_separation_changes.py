@@ -101,7 +101,7 @@ def test_during_queries_each_answer_is_of_one_state():
         ((True, 1, 0.1), TypeError, "^mesh_a: expected an integer, got bool"),
     ],
 )
-def test_what_is_refused_changes_nothing(arguments, error, text):
+def test_what_is_rejected_changes_nothing(arguments, error, text):
     meshes = random_scenes.many_meshes(np.random.default_rng(64))
     scene = meshes.scene()
     detector = hc.Detector(scene, minimum_separation=0.0625, backend="cpu")

@@ -333,14 +333,14 @@ def test_points_and_normals_stand_between_the_nearest_points():
         (True, TypeError, "minimum_separation"),
     ],
 )
-def test_bad_separations_are_refused(value, error, text):
+def test_bad_separations_are_rejected(value, error, text):
     with pytest.raises(error, match=text):
         hc.Detector(hc.Scene(), minimum_separation=value)
     with pytest.raises(error, match=text):
         hc.test_vertex_face(np.zeros((1, 8, 3)), minimum_separation=value)
 
 
-def test_bad_separations_of_pairs_are_refused():
+def test_bad_separations_of_pairs_are_rejected():
     scene = random_scenes.many_meshes(np.random.default_rng(46)).scene()
     detector = hc.Detector(scene, backend="cpu")
     for owner in (scene, detector):
@@ -353,7 +353,7 @@ def test_bad_separations_of_pairs_are_refused():
             owner.set_separation(0, 99, 1.0)
 
 
-def test_bad_tables_of_separations_are_refused():
+def test_bad_tables_of_separations_are_rejected():
     meshes = five_small_meshes(np.random.default_rng(47))
     detector = hc.Detector(meshes.scene(), backend="cpu")
     one_sided, not_finite, negative = np.zeros((3, 5, 5))

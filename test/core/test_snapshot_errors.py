@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Positions that queries of one snapshot refuse, by name, place and remedy; and that they answer well afterwards."""
+"""Positions that queries of one snapshot reject, by name, place and remedy; and that they answer well afterwards."""
 
 import numpy as np
 import pytest
@@ -31,9 +31,9 @@ def test_coordinates_that_are_no_places(query, dtype, bad):
         for row, axis in ((0, 0), (len(good) // 2, 2), (len(good) - 1, 1)):
             vertices = good.copy()
             vertices[row, axis] = bad
-            with pytest.raises(ValueError, match=rf"^vertices\[{row}, {axis}\] is ") as refused:
+            with pytest.raises(ValueError, match=rf"^vertices\[{row}, {axis}\] is ") as rejected:
                 QUERIES[query](detector, vertices)
-            text = str(refused.value)
+            text = str(rejected.value)
             assert "must be finite" in text or "beyond 1e+300: intermediate results could overflow; scale" in text
     assert answer_of(QUERIES[query](detector, good)) == before
 
@@ -83,7 +83,7 @@ def test_the_largest_coordinates_are_taken(query):
 
 
 def test_what_a_snapshot_may_hold_a_motion_may_not_even_at_rest():
-    """A static mesh that proximity has taken is refused by detect all the same, as a new detector refuses it."""
+    """A static mesh that proximity has taken is rejected by detect all the same, as a new detector rejects it."""
     scene = hc.Scene()
     scene.add_mesh("moving", [[0, 1, 2]])
     scene.add_mesh("static", [[0, 1, 2]], static=True)

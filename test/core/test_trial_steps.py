@@ -277,7 +277,7 @@ def test_separations_that_change_between_trials():
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e200])
-def test_a_refused_call_leaves_nothing_behind(bad):
+def test_a_rejected_call_leaves_nothing_behind(bad):
     meshes = flat_fall(1.0)
     detector = hc.Detector(meshes.scene(), backend="cpu")
     v0, v1 = meshes.vertices_t0.copy(), meshes.vertices_t1.copy()

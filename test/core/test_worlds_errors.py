@@ -79,7 +79,7 @@ def test_a_bad_coordinate_is_named_and_nothing_else_is_lost(worlds, threads):
         assert_contacts(detector.detect(worlds.start, worlds.end), expected)
 
 
-def test_a_refused_step_does_not_count(worlds):
+def test_a_rejected_step_does_not_count(worlds):
     detector = worlds.detector()
     bad = worlds.end.copy()
     bad[2, 0, 0] = np.nan

@@ -25,7 +25,7 @@ SMALL = ["demo", "--size", "0.1", "--frames", "40", "--rate", "40"]
 
 @pytest.fixture
 def demo_domain(monkeypatch):
-    """The demo refuses a domain in which a node /hpccd runs: it gets to choose its own, as for a user."""
+    """The demo rejects a domain in which a node /hpccd runs: it gets to choose its own, as for a user."""
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
 
 

@@ -30,9 +30,9 @@ def frame(stamp, z, topology=OLD):
 class Run:
     """What a detection thread made of ``frames``."""
 
-    def __init__(self, *frames, refuse_answer_at=None):
+    def __init__(self, *frames, reject_answer_at=None):
         self.steps, self.starts, self.failed = [], [], []
-        self.refuse_answer_at = refuse_answer_at
+        self.reject_answer_at = reject_answer_at
         queue = FrameQueue(100)
         thread = DetectionThread(
             StepDetector(SceneBuilder((MeshSettings("cloth"),)), Options()),
@@ -51,7 +51,7 @@ class Run:
         assert not thread.is_alive()
 
     def _answer(self, found):
-        if found.end.stamp == self.refuse_answer_at:
+        if found.end.stamp == self.reject_answer_at:
             raise MemoryError("no room for the answer")
         self.steps.append((found.start.stamp, found.end.stamp, len(found.contacts)))
 
@@ -64,7 +64,7 @@ def test_step_over_a_frame_that_cannot_be_tested():
 
 
 def test_step_whose_answer_could_not_be_sent():
-    run = Run(frame(1, 0.5), frame(2, -0.5), frame(3, -0.7), refuse_answer_at=2)
+    run = Run(frame(1, 0.5), frame(2, -0.5), frame(3, -0.7), reject_answer_at=2)
     assert [step[:2] for step in run.steps] == [(1, 3)] and run.steps[0][2] > 0
     assert run.failed == [(2, "no room for the answer")]
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hpccd_ros.frames.assembler import FrameAssembler
-from hpccd_ros.frames.drops import Input, Reason, RefusalCounter
+from hpccd_ros.frames.drops import Input, Reason, RejectionCounter
 from hpccd_ros.frames.types import AssemblyRules, MeshFrame, MeshSettings, Topology
 
 FACES = np.array([[0, 1, 2]], np.uint32)
@@ -24,7 +24,7 @@ class Scene:
     """An assembler, and what it gave back."""
 
     def __init__(self, *meshes, **options):
-        self.drops, self.refused = RefusalCounter(), RefusalCounter()
+        self.drops, self.rejected = RejectionCounter(), RejectionCounter()
         self.restart_texts = []
         self.static_taken = 0
         meshes = [m if isinstance(m, MeshSettings) else MeshSettings(m) for m in meshes]
@@ -44,8 +44,8 @@ class Scene:
         return self._frames(self.assembler.add(mesh, frame(*args, **kwargs), new_publisher))
 
     def _frames(self, outcome):
-        for refusal in outcome.refusals:
-            (self.refused if refusal.what is Input.TOPOLOGY else self.drops).count(refusal)
+        for rejection in outcome.rejections:
+            (self.rejected if rejection.what is Input.TOPOLOGY else self.drops).count(rejection)
         self.restart_texts += outcome.restarts
         self.static_taken += outcome.static_taken
         return outcome.frames
@@ -123,14 +123,14 @@ def test_unknown_mesh():
     assert scene.add("ghost", 1) == []
     assert scene.set_topology("ghost", topology()) == []
     assert scene.dropped() == {"unknown_mesh": 1}
-    assert scene.refused.by_reason() == {Reason.UNKNOWN_MESH: 1}
+    assert scene.rejected.by_reason() == {Reason.UNKNOWN_MESH: 1}
 
 
 def test_wrong_vertex_count():
     scene = Scene("cloth").topologies("cloth")
     assert scene.add("cloth", 1, n=4) == []
     assert scene.dropped() == {"wrong_vertex_count": 1}
-    assert len(scene.add("cloth", 1)) == 1, "a refused frame must not use up its stamp"
+    assert len(scene.add("cloth", 1)) == 1, "a rejected frame must not use up its stamp"
 
 
 def test_vertices_before_their_topology_wait_for_it():
@@ -206,13 +206,13 @@ def test_a_lower_version_of_a_new_publisher_begins_anew():
     assert scene.dropped() == {"old_topology": 1}
 
 
-def test_old_and_conflicting_topologies_are_refused():
+def test_old_and_conflicting_topologies_are_rejected():
     scene = Scene("cloth")
     scene.set_topology("cloth", topology(5))
     scene.set_topology("cloth", topology(4))
     scene.set_topology("cloth", topology(5, 9))
     assert scene.assembler.topology("cloth").n_vertices == 3
-    assert scene.refused.by_reason() == {Reason.OLD_TOPOLOGY: 1, Reason.TOPOLOGY_CONFLICT: 1}
+    assert scene.rejected.by_reason() == {Reason.OLD_TOPOLOGY: 1, Reason.TOPOLOGY_CONFLICT: 1}
 
 
 def test_repeated_topology_changes_nothing():
@@ -220,7 +220,7 @@ def test_repeated_topology_changes_nothing():
     (before,) = scene.add("cloth", 1)
     scene.set_topology("cloth", topology())
     (after,) = scene.add("cloth", 2)
-    assert before.same_scene(after) and scene.refused.total == 0
+    assert before.same_scene(after) and scene.rejected.total == 0
 
 
 def test_new_publisher_may_count_versions_from_the_start():
@@ -314,7 +314,7 @@ def test_a_new_publisher_beside_another_one_does_not_take_the_frame_from_it():
     assert scene.restarts == 0
 
 
-def test_new_publisher_is_noticed_although_its_first_frames_are_refused():
+def test_new_publisher_is_noticed_although_its_first_frames_are_rejected():
     scene = Scene("cloth", restart_after=0).topologies("cloth")
     scene.add("cloth", 100, frame_id="world")
     assert scene.add("cloth", 1, n=4, frame_id="map", new_publisher=True) == []
@@ -447,13 +447,13 @@ def test_no_message_is_unaccounted_for(tolerance):
     assert accounted == scene.sent
     assert used > 50
     assert {"wrong_vertex_count", "old_topology", "stamp_backward"} <= scene.dropped().keys()
-    for refusal in scene.assembler.clear(Reason.STOPPED):
-        scene.drops.count(refusal)
+    for rejection in scene.assembler.clear(Reason.STOPPED):
+        scene.drops.count(rejection)
     assert scene.assembler.waiting == 0
     assert used + scene.drops.total + scene.static_taken == scene.sent
 
 
-def test_scene_that_cannot_move_is_refused():
+def test_scene_that_cannot_move_is_rejected():
     with pytest.raises(ValueError, match="at least one mesh must not be static"):
         Scene(MeshSettings("floor", static=True))
 

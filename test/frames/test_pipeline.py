@@ -28,13 +28,13 @@ def pipeline_of(*meshes, **options):
     made = FramePipeline(meshes, AssemblyRules(**options))
     for mesh in meshes:
         outcome = made.push(mesh.name, topology())
-        assert (outcome.frames, outcome.refusals) == ([], [])
+        assert (outcome.frames, outcome.rejections) == ([], [])
     return made
 
 
 def enqueued(pipeline, outcome):
     for each in outcome.frames:
-        outcome.refusals += pipeline.enqueue(each)
+        outcome.rejections += pipeline.enqueue(each)
     return outcome
 
 
@@ -44,7 +44,7 @@ def stamps(frames):
 
 def test_a_message_of_the_only_mesh_is_a_frame():
     outcome = pipeline_of(CLOTH).push("cloth", frame(7))
-    assert stamps(outcome.frames) == [7] and outcome.refusals == outcome.restarts == []
+    assert stamps(outcome.frames) == [7] and outcome.rejections == outcome.restarts == []
 
 
 def test_a_frame_comes_up_with_the_message_that_completes_it():
@@ -53,7 +53,7 @@ def test_a_frame_comes_up_with_the_message_that_completes_it():
     assert pipeline.waiting == 2
     outcome = pipeline.push("ball", frame(2))
     assert stamps(outcome.frames) == [2] and reasons(outcome) == [("cloth", "incomplete")]
-    assert "stamp 1 ns has no frame of ball" in outcome.refusals[0].text
+    assert "stamp 1 ns has no frame of ball" in outcome.rejections[0].text
     assert pipeline.waiting == 0
 
 
@@ -62,14 +62,14 @@ def test_where_nobody_sends_what_is_missing_no_stamp_is_blamed(moved):
     link = MeshSettings("link", input=moved, frame="link_frame")
     pipeline = pipeline_of(CLOTH, link, frame_id="world", max_pending=1)
     outcomes = [pipeline.push("cloth", frame(stamp)) for stamp in (1, 2)]
-    (text,) = {refusal.text for outcome in outcomes for refusal in outcome.refusals if refusal.mesh == "cloth"}
+    (text,) = {rejection.text for outcome in outcomes for rejection in outcome.rejections if rejection.mesh == "cloth"}
     assert text.startswith("stamp 1 ns has no frame of link; descriptions, joint states or transforms for that stamp")
 
 
-def test_refusals_say_what_they_are_of():
+def test_rejections_say_what_they_are_of():
     pipeline = pipeline_of(CLOTH)
-    (of_vertices,) = pipeline.push("cloth", frame(1, n=4)).refusals
-    (of_topology,) = pipeline.push("cloth", topology(n_vertices=9)).refusals
+    (of_vertices,) = pipeline.push("cloth", frame(1, n=4)).rejections
+    (of_topology,) = pipeline.push("cloth", topology(n_vertices=9)).rejections
     assert (of_vertices.what, of_vertices.reason) == (Input.VERTICES, Reason.WRONG_COUNT)
     assert (of_topology.what, of_topology.reason) == (Input.TOPOLOGY, Reason.TOPOLOGY_CONFLICT)
 
@@ -121,7 +121,7 @@ def test_what_the_queue_has_no_room_for_comes_up_as_overload():
     queue = pipeline.start(1)
     for stamp in (1, 2):
         pipeline.push("cloth", frame(stamp))
-        assert enqueued(pipeline, pipeline.push("ball", frame(stamp))).refusals == []
+        assert enqueued(pipeline, pipeline.push("ball", frame(stamp))).rejections == []
     pipeline.push("cloth", frame(3))
     outcome = enqueued(pipeline, pipeline.push("ball", frame(3)))
     assert stamps(outcome.frames) == [3] and reasons(outcome) == [("cloth", "overload"), ("ball", "overload")]
@@ -142,7 +142,7 @@ def test_stopped_with_all_that_waits(warned_at_once):
     outcome = pipeline.stop()
     assert sorted(reasons(outcome)) == [("ball", "stopped")] * 3 + [("held", "stopped")] * 2
     assert pipeline.waiting == 0 and queue.pop() is None
-    assert pipeline.stop().refusals == []
+    assert pipeline.stop().rejections == []
     # The transforms are forgotten, the topologies are not.
     pipeline.start(5)
     assert pipeline.push("held", frame(1, frame_id="hand")).frames == [] and pipeline.awaited_transform("held")
@@ -155,7 +155,7 @@ def test_no_message_is_unaccounted_for(queued):
     held = MeshSettings("cloth", transform="tf")
     pipeline = pipeline_of(held, BALL, FLOOR, frame_id="world", restart_after=4)
     queue = pipeline.start(2) if queued else None
-    sent = answered = refused = 0
+    sent = answered = rejected = 0
     for i in range(3000):
         mesh = rng.choice(["cloth", "ball", "cloth", "ball", "floor"])
         stamp = i // 6 + int(rng.integers(-2, 3))
@@ -168,12 +168,12 @@ def test_no_message_is_unaccounted_for(queued):
         for outcome in outcomes:
             if queue is not None:
                 enqueued(pipeline, outcome)
-            refused += len(outcome.refusals)
+            rejected += len(outcome.rejections)
             answered += outcome.static_taken
             if queue is None:
                 answered += sum(len(f.fresh) for f in outcome.frames)
         if queue is not None and rng.random() < 0.2 and queue.frames():
             answered += len(queue.pop().frame.fresh)
-        assert answered + refused + pipeline.waiting == sent
-    refused += len(pipeline.stop().refusals)
-    assert answered + refused == sent and answered > 100 and refused > 100
+        assert answered + rejected + pipeline.waiting == sent
+    rejected += len(pipeline.stop().rejections)
+    assert answered + rejected == sent and answered > 100 and rejected > 100

@@ -64,15 +64,15 @@ def test_poses_of_the_same_stamp_as_frames_of_others():
     assert frame.placements[0] is None and frame.placements[1].pose is QUARTER
 
 
-def test_without_a_shape_a_pose_is_refused():
+def test_without_a_shape_a_pose_is_rejected():
     pipeline = pipeline_of(BOX, shapes=False)
     outcome = pipeline.push("box", PoseFrame(7, QUARTER))
-    assert reasons(outcome) == [("box", "no_shape")] and "mesh.box.file" in outcome.refusals[0].text
+    assert reasons(outcome) == [("box", "no_shape")] and "mesh.box.file" in outcome.rejections[0].text
     pipeline.push("box", shape())
     assert pipeline.push("box", PoseFrame(8, QUARTER)).frames
 
 
-def test_a_shape_of_another_size_is_refused_with_each_pose():
+def test_a_shape_of_another_size_is_rejected_with_each_pose():
     pipeline = pipeline_of(BOX, shapes=False)
     pipeline.push("box", MeshFrame(0, TRIANGLE[:2], 0))
     assert reasons(pipeline.push("box", PoseFrame(7, QUARTER))) == [("box", "wrong_vertex_count")]
@@ -102,7 +102,7 @@ def test_poses_too_far_away():
 
 
 @pytest.mark.parametrize("far, taken", [(9e146, True), (1.1e147, False), (9e149, False)])
-def test_poses_whose_arcs_would_leave_what_the_core_takes_are_refused_at_once(far, taken):
+def test_poses_whose_arcs_would_leave_what_the_core_takes_are_rejected_at_once(far, taken):
     """Whichever two come, the step between them is answered: half a turn, with a separation and a mesh as far away."""
     half = Rigid.of((far, far, 0), (0, 0, 1, 0))
     poses = [Rigid.of((far, far, 0), (0, 0, 0, 1)), half, Rigid.of((-far, -far, far), (1, 0, 0, 0))]
@@ -112,7 +112,7 @@ def test_poses_whose_arcs_would_leave_what_the_core_takes_are_refused_at_once(fa
         outcome = pipeline.push("box", PoseFrame(stamp, pose))
         outcome += pipeline.push("tool", PoseFrame(stamp, Rigid.of(-pose.shift, pose.quaternion)))
         assert reasons(outcome)[:1] == ([] if taken else [("box", "out_of_range")])
-        assert taken or "of a mesh that moves by poses must lie in [-1e+147, 1e+147]" in outcome.refusals[0].text
+        assert taken or "of a mesh that moves by poses must lie in [-1e+147, 1e+147]" in outcome.rejections[0].text
         frames += outcome.frames
     assert len(frames) == (3 if taken else 0)
     builder = SceneBuilder([BOX, MeshSettings("tool", self_collision=False, input="pose")])
@@ -120,11 +120,11 @@ def test_poses_whose_arcs_would_leave_what_the_core_takes_are_refused_at_once(fa
     assert all(len(detector.detect(start, end).contacts) for start, end in pairwise(frames))
 
 
-def test_a_shape_too_large_for_poses_is_refused_and_the_one_before_stays():
+def test_a_shape_too_large_for_poses_is_rejected_and_the_one_before_stays():
     stands = MeshSettings("box", pose=(1e147, 0, 0, 0, 0, 0, 1), input="pose")
     pipeline = pipeline_of(stands, shapes=False)
     outcome = pipeline.push("box", MeshFrame(0, np.float64(1e147) * TRIANGLE, 0))
-    assert reasons(outcome) == [("box", "out_of_range")] and "placed by mesh.box.pose" in outcome.refusals[0].text
+    assert reasons(outcome) == [("box", "out_of_range")] and "placed by mesh.box.pose" in outcome.rejections[0].text
     assert reasons(pipeline.push("box", PoseFrame(1, QUARTER))) == [("box", "no_shape")]
     pipeline = pipeline_of(BOX)
     assert reasons(pipeline.push("box", MeshFrame(0, np.float64(1e148) * TRIANGLE, 0))) == [("box", "out_of_range")]
@@ -159,7 +159,7 @@ def test_a_transform_that_does_not_come_is_told_and_gives_way(warned_at_once):
     for stamp in range(1, 8):
         outcome += pipeline.push("cloth", cloth(stamp))
     assert {("link", "no_transform"), ("cloth", "incomplete")} == set(reasons(outcome))
-    assert outcome.asked == ["link"] * 7 and pipeline.waiting + len(outcome.refusals) == 14
+    assert outcome.asked == ["link"] * 7 and pipeline.waiting + len(outcome.rejections) == 14
     assert "no transform connects 'link_frame' and 'world'" in pipeline.awaited_transform("link")[0]
 
 
@@ -222,7 +222,7 @@ def test_transforms_alone_that_go_back_by_less_than_a_second_begin_anew_as_meshe
                 outcome += part
     assert stamps[:90] == list(range(0, 900, 10))
     assert stamps[90:] == list(range(900 if first is None else first, 1000, 10))
-    assert len(outcome.restarts) == (first is not None) and not outcome.refusals
+    assert len(outcome.restarts) == (first is not None) and not outcome.rejections
 
 
 def test_transforms_alone_of_which_one_is_late_do_not_begin_anew():
@@ -251,20 +251,20 @@ def test_what_is_left_out_far_ahead_takes_nothing_that_is_known_with_it(later):
     for stamp, x in ((1000, 0.0), (1010, 1.0), (3_600_000, 2.0), (990, 3.0), (later, 4.0)):
         pipeline.transforms.add("world", "link_frame", Rigid.of((x, 0, 0), (0, 0, 0, 1)), stamp * MS)
         outcome = retried(pipeline)
-        assert not outcome.refusals
+        assert not outcome.rejections
         seen += [(frame.stamp // MS, frame.placements[0].pose.shift[0]) for frame in outcome.frames]
     assert seen == [(1000, 0.0), (1010, 1.0), (3_600_000, 2.0), (1010, 1.0), (later, 4.0)]
 
 
 def test_of_what_was_far_ahead_together_each_goes_on_by_itself():
-    pipeline, stamps, refusals = pipeline_of(LINK, TOOL), [], []
+    pipeline, stamps, rejections = pipeline_of(LINK, TOOL), [], []
     for stamp in (10_000, 3_600_000, 10_010, 10_020):
         for frame in ("tool", "link"):
             pipeline.transforms.add("world", f"{frame}_frame", IDENTITY, stamp * MS)
             outcome = retried(pipeline)
             stamps += [frame.stamp // MS for frame in outcome.frames]
-            refusals += outcome.refusals
-    assert stamps == [10_000, 3_600_000, 10_010, 10_020] and pipeline.waiting == 0 and not refusals
+            rejections += outcome.rejections
+    assert stamps == [10_000, 3_600_000, 10_010, 10_020] and pipeline.waiting == 0 and not rejections
 
 
 def test_after_the_clock_was_set_back_no_transform_from_before_is_used():
@@ -285,7 +285,7 @@ def test_after_the_clock_was_set_back_no_transform_from_before_is_used():
 
 
 @pytest.mark.parametrize("restart_after", [0, 5])
-def test_refused_frames_of_the_leader_ask_nothing_of_transforms(restart_after):
+def test_rejected_frames_of_the_leader_ask_nothing_of_transforms(restart_after):
     pipeline = pipeline_of(CLOTH, LINK, restart_after=restart_after)
     pipeline.transforms.add("world", "link_frame", QUARTER, None)
     stamps = []
@@ -306,20 +306,20 @@ def test_a_new_publisher_loses_no_frame_where_transforms_move_another_mesh():
     for stamp in (100_000, 200_000, 100, 200):
         outcome = pipeline.push("cloth", cloth(stamp), stamp == 100)
         stamps += [frame.stamp for frame in outcome.frames]
-        assert len(outcome.restarts) == (stamp == 100) and not outcome.refusals
+        assert len(outcome.restarts) == (stamp == 100) and not outcome.rejections
     assert stamps == [100_000, 200_000, 100, 200]
 
 
 def test_transforms_alone_wait_for_those_that_are_not_there_yet():
-    pipeline, stamps, refused = pipeline_of(LINK, TOOL, max_pending=8), [], []
+    pipeline, stamps, rejected = pipeline_of(LINK, TOOL, max_pending=8), [], []
     for now in range(0, 300, 10):
         pipeline.transforms.add("world", "link_frame", IDENTITY, now * MS)
         if now >= 100:  # begins later, and comes late
             pipeline.transforms.add("world", "tool_frame", IDENTITY, (now - 80) * MS)
         outcome = retried(pipeline)
         stamps += [frame.stamp // MS for frame in outcome.frames]
-        refused += reasons(outcome) + outcome.restarts
-    assert stamps == list(range(20, 220, 10)) and not refused
+        rejected += reasons(outcome) + outcome.restarts
+    assert stamps == list(range(20, 220, 10)) and not rejected
 
 
 def test_a_frame_of_the_leader_that_waited_for_its_topology_asks_too():

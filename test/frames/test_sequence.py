@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lost messages and new publishers from sequence numbers; the log of refusals."""
+"""Lost messages and new publishers from sequence numbers; the log of rejections."""
 
 from hpccd_ros.frames.arrivals import InterleavedSequences, SequenceWatch
-from hpccd_ros.frames.drops import Reason, Refusal
-from hpccd_ros.node.accounts import RefusalLog
+from hpccd_ros.frames.drops import Reason, Rejection
+from hpccd_ros.node.accounts import RejectionLog
 
 
 def test_gaps_are_losses():
@@ -57,9 +57,9 @@ def test_sequences_of_several_publishers():
     assert interleaved("+", "+", 1, "-", 3) == [0, 1], "the one that ended was never read"
 
 
-def test_refusals_do_not_flood_the_log():
+def test_rejections_do_not_flood_the_log():
     now, lines = [0.0], []
-    log = RefusalLog(lines.append, period=10.0, clock=lambda: now[0])
+    log = RejectionLog(lines.append, period=10.0, clock=lambda: now[0])
     for _ in range(5):
         log("cloth", Reason.NOT_FINITE, "vertex 3 is nan")
     log("cloth", Reason.LATE, "stamp 4")
@@ -73,11 +73,11 @@ def test_refusals_do_not_flood_the_log():
     assert log.last == "cloth: not_finite: vertex 4 is nan"
 
 
-def test_what_is_refused_of_many_links_of_a_robot_is_one_line():
+def test_what_is_rejected_of_many_links_of_a_robot_is_one_line():
     lines = []
-    log = RefusalLog(lines.append)
-    links = [Refusal(f"arm/l{k}", Reason.NO_TRANSFORM, f"no transform connects 'left_l{k}'") for k in range(30)]
-    log.together([*links, Refusal("cloth", Reason.LATE, "stamp 4"), Refusal("arm/l1", Reason.RESTART), *links[:2]])
+    log = RejectionLog(lines.append)
+    links = [Rejection(f"arm/l{k}", Reason.NO_TRANSFORM, f"no transform connects 'left_l{k}'") for k in range(30)]
+    log.together([*links, Rejection("cloth", Reason.LATE, "stamp 4"), Rejection("arm/l1", Reason.RESTART), *links[:2]])
     log.together(links)
     first = "arm/l0: no_transform: no transform connects 'left_l0'; as well arm/l1, arm/l2, arm/l3, arm/l4, arm/l5, "
     assert lines == ["cloth: late: stamp 4", first + "arm/l6, arm/l7, arm/l8, arm/l9, arm/l10 and 19 more"]

@@ -140,21 +140,23 @@ def test_a_transform_far_ahead_is_left_out_by_the_next_one_and_told_of():
             with pytest.raises(NoTransformError, match="far ahead of the stamp 2500000000 ns") as caught:
                 buffer.lookup("hand", "world", 5 * SECOND // 2)
             assert not caught.value.final
-    (refusal,) = found
-    assert (refusal.what, refusal.reason) == (Input.TRANSFORM, Reason.AHEAD)
-    assert refusal.text.startswith("transform from 'hand': one of stamp 3600000000000 ns came more than 10 s ahead of")
+    (rejection,) = found
+    assert (rejection.what, rejection.reason) == (Input.TRANSFORM, Reason.AHEAD)
+    assert rejection.text.startswith(
+        "transform from 'hand': one of stamp 3600000000000 ns came more than 10 s ahead of"
+    )
     assert buffer.lookup("hand", "world", 5 * SECOND // 2).shift[0] == 2.5
 
 
 @pytest.mark.parametrize("static", [False, True])
-def test_transform_of_no_time_is_refused(static):
+def test_transform_of_no_time_is_rejected(static):
     message = TransformStamped(child_frame_id="hand")
     message.header.frame_id, message.header.stamp.nanosec = "world", SECOND
     buffer = TransformBuffer()
     topic = transform_topics.ALL["transforms_static" if static else "transforms"]
-    (refusal,) = transform_topics.fill(buffer, message, topic)
-    assert (refusal.mesh, refusal.reason, refusal.what) == (topic.name, Reason.MALFORMED, Input.TRANSFORM)
-    assert "transform from 'hand' to 'world': stamp has sec 0 and nanosec 1000000000" in refusal.text
+    (rejection,) = transform_topics.fill(buffer, message, topic)
+    assert (rejection.mesh, rejection.reason, rejection.what) == (topic.name, Reason.MALFORMED, Input.TRANSFORM)
+    assert "transform from 'hand' to 'world': stamp has sec 0 and nanosec 1000000000" in rejection.text
     with pytest.raises(NoTransformError, match="no transform connects"):
         buffer.lookup("hand", "world", SECOND)
 
@@ -229,7 +231,7 @@ def test_frames_of_a_new_publisher_wait_for_transforms_of_its_run():
     for stamp in (0, 8, 16):
         buffer.add("world", "hand", NOW, stamp * MS)
     ((placed, new),) = gate.retry()
-    assert new and np.allclose(placed.vertices, NOW.apply(POINTS)) and not gate.refusals
+    assert new and np.allclose(placed.vertices, NOW.apply(POINTS)) and not gate.rejections
 
 
 class Gate:
@@ -238,7 +240,7 @@ class Gate:
     def __init__(self, buffer=None, **settings):
         mesh = MeshSettings("cloth", **settings)
         self.transformer = MeshTransformer(mesh, "world", 2, buffer if buffer is not None else TransformBuffer())
-        self.refusals = []
+        self.rejections = []
 
     def transform(self, given, new_publisher=False):
         return self._frames(self.transformer.transform(given, new_publisher))
@@ -247,7 +249,7 @@ class Gate:
         return self._frames(self.transformer.retry())
 
     def _frames(self, transformed):
-        self.refusals += transformed.refusals
+        self.rejections += transformed.rejections
         return transformed.frames
 
     @property
@@ -258,7 +260,7 @@ class Gate:
         return self.transformer.warnings()
 
     def reasons(self):
-        return [refusal.reason for refusal in self.refusals]
+        return [rejection.reason for rejection in self.rejections]
 
 
 def frame(stamp, frame_id="hand"):
@@ -276,7 +278,7 @@ def test_placed_by_a_pose():
     assert np.array_equal(placed.vertices, POINTS + [0, 0, 1])
     gate = Gate(transform="pose", frame="hand")
     assert gate.transform(frame(1, "foot")) == []
-    assert [(refusal.mesh, refusal.reason) for refusal in gate.refusals] == [("cloth", Reason.FRAME_ID)]
+    assert [(rejection.mesh, rejection.reason) for rejection in gate.rejections] == [("cloth", Reason.FRAME_ID)]
 
 
 def test_a_transform_can_push_positions_out_of_range():
@@ -295,7 +297,7 @@ def test_frames_wait_in_order_for_their_transforms(warned_at_once):
     assert gate.transform(frame(1 * SECOND)) == gate.transform(frame(2 * SECOND, "")) == [] and gate.waiting == 2
     assert "no transform connects 'hand' and 'world'" in gate.warnings()[0]
     assert gate.transform(frame(3 * SECOND)) == [] and gate.waiting == 2, "the oldest gave way"
-    assert gate.reasons() == [Reason.NO_TRANSFORM] and "no transform connects" in gate.refusals[0].text
+    assert gate.reasons() == [Reason.NO_TRANSFORM] and "no transform connects" in gate.rejections[0].text
     for k in (2, 3):
         buffer.add("world", "hand", turn(90 * k), k * SECOND)
     ready = gate.retry()
@@ -304,7 +306,7 @@ def test_frames_wait_in_order_for_their_transforms(warned_at_once):
     assert gate.transform(frame(SECOND)) == [] and gate.waiting == 0, "older than what is kept: will never come"
     assert gate.reasons() == [Reason.NO_TRANSFORM] * 2
     gate.transform(frame(9 * SECOND))
-    assert [refusal.reason for refusal in gate.transformer.clear(Reason.STOPPED)] == [Reason.STOPPED]
+    assert [rejection.reason for rejection in gate.transformer.clear(Reason.STOPPED)] == [Reason.STOPPED]
     assert gate.waiting == 0
 
 
@@ -316,7 +318,7 @@ def test_a_frame_without_any_transform_holds_up_nobody(warned_at_once):
     assert "no transform connects 'ghost' and 'world'" in gate.warnings()[0]
     assert [f.stamp for f, _ in gate.transform(frame(2 * SECOND))] == [2 * SECOND]
     assert gate.waiting == 0 and gate.reasons() == [Reason.NO_TRANSFORM]
-    assert "no transform connects 'ghost'" in gate.refusals[0].text and "a later frame" in gate.refusals[0].text
+    assert "no transform connects 'ghost'" in gate.rejections[0].text and "a later frame" in gate.rejections[0].text
     # What is only late is waited for, in order, and a ghost between them gives way with the first that is ready.
     assert gate.transform(frame(3 * SECOND, "ghost")) == gate.transform(frame(4 * SECOND)) == [] and gate.waiting == 2
     buffer.add("world", "hand", turn(0), 4 * SECOND)
@@ -332,15 +334,15 @@ def test_a_ghost_that_becomes_known_in_time_is_placed_in_order():
     buffer.add("world", "ghost", turn(0), None)
     assert [f.stamp for f, _ in gate.retry()] == [2 * SECOND] and gate.waiting == 1
     buffer.add("world", "hand", turn(0), 3 * SECOND)
-    assert [f.stamp for f, _ in gate.retry()] == [3 * SECOND] and not gate.refusals
+    assert [f.stamp for f, _ in gate.retry()] == [3 * SECOND] and not gate.rejections
 
 
-def test_a_new_publisher_is_noticed_although_its_first_frame_is_refused():
+def test_a_new_publisher_is_noticed_although_its_first_frame_is_rejected():
     buffer = TransformBuffer()
     buffer.add("world", "hand", turn(0), None)
     gate = Gate(buffer, transform="tf")
-    for refused in (frame(1, ""), frame(1, "ghost")):
-        assert gate.transform(refused, new_publisher=True) == []
+    for rejected in (frame(1, ""), frame(1, "ghost")):
+        assert gate.transform(rejected, new_publisher=True) == []
         assert [new for k in (2, 3) for _, new in gate.transform(frame(k))] == [True, False]
 
 

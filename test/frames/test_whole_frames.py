@@ -43,31 +43,31 @@ def test_the_same_version_of_other_content_is_another_one():
     assert not b.same_scene(a) and np.array_equal(b.topologies[0].faces, TWO[::-1])
 
 
-def test_that_of_a_refused_frame_is_not_in_force():
+def test_that_of_a_rejected_frame_is_not_in_force():
     scene = assembler(WHOLE)
     scene.add("cloth", frame(5))
-    (refusal,) = scene.add("cloth", frame(5, version=3, faces=TWO[:1], n=3)).refusals
-    assert refusal.reason == Reason.REPEATED
-    (refusal,) = scene.add("cloth", frame(4, version=3, faces=TWO[:1], n=3)).refusals
-    assert refusal.reason == Reason.BACKWARD
+    (rejection,) = scene.add("cloth", frame(5, version=3, faces=TWO[:1], n=3)).rejections
+    assert rejection.reason == Reason.REPEATED
+    (rejection,) = scene.add("cloth", frame(4, version=3, faces=TWO[:1], n=3)).rejections
+    assert rejection.reason == Reason.BACKWARD
     assert scene.topology("cloth").version == 9
     (after,) = scene.add("cloth", frame(6)).frames
     assert after.topologies[0] is scene.topology("cloth")
 
 
-def test_a_topology_of_its_own_is_refused():
+def test_a_topology_of_its_own_is_rejected():
     scene = assembler(WHOLE)
     scene.add("cloth", frame(1))
-    (refusal,) = scene.set_topology("cloth", Topology(10, 3, TWO[:1]), new_publisher=True).refusals
-    assert (refusal.reason, refusal.what) == (Reason.TOPOLOGY_CONFLICT, Input.TOPOLOGY)
-    assert "the topology comes with the positions (parameter mesh.cloth.input)" in refusal.text
+    (rejection,) = scene.set_topology("cloth", Topology(10, 3, TWO[:1]), new_publisher=True).rejections
+    assert (rejection.reason, rejection.what) == (Reason.TOPOLOGY_CONFLICT, Input.TOPOLOGY)
+    assert "the topology comes with the positions (parameter mesh.cloth.input)" in rejection.text
     assert scene.topology("cloth").version == 9
 
 
 def test_beside_a_static_whole_mesh():
     scene = assembler(MeshSettings("room", static=True, whole=True), WHOLE)
-    (refusal,) = scene.add("cloth", frame(1)).refusals
-    assert refusal.reason == Reason.STATIC_MISSING
+    (rejection,) = scene.add("cloth", frame(1)).rejections
+    assert rejection.reason == Reason.STATIC_MISSING
     scene.add("room", frame(77, version=5, value=1.0))
     (a,) = scene.add("cloth", frame(2)).frames
     scene.add("room", frame(78, version=5, value=1.0))
@@ -82,5 +82,5 @@ def test_positions_of_an_older_topology_of_a_static_mesh_are_forgotten():
     scene = assembler(MeshSettings("room", static=True, whole=True), WHOLE)
     scene.add("room", frame(1, frame_id="world"))
     scene.add("room", frame(2, version=6, faces=TWO[:1], n=3, frame_id="hall"))
-    (refusal,) = scene.add("cloth", frame(3, frame_id="world")).refusals
-    assert refusal.reason == Reason.STATIC_MISSING and "only in 'hall'" in refusal.text
+    (rejection,) = scene.add("cloth", frame(3, frame_id="world")).rejections
+    assert rejection.reason == Reason.STATIC_MISSING and "only in 'hall'" in rejection.text

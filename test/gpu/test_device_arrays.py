@@ -125,7 +125,7 @@ def test_steps_stay_on_the_device(library):
         gpu.step(on_device)
 
 
-def test_a_refused_step_does_not_count():
+def test_a_rejected_step_does_not_count():
     cupy = pytest.importorskip("cupy")
     scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(7), 12)])
     bad = t0.copy()

@@ -78,7 +78,7 @@ def test_any_number_of_gpus(gpus):
     assert detector.stats["gpus"] == gpus
 
 
-def test_more_gpus_than_there_are_is_refused():
+def test_more_gpus_than_there_are_is_rejected():
     scene, _, _ = scenes.join([scenes.crumpled(np.random.default_rng(14), 8)])
     with pytest.raises(ValueError, match="gpus: 1000 were asked for"):
         hc.Detector(scene, backend="hybrid", gpus=1000)

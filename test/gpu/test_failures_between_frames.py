@@ -90,14 +90,14 @@ def test_a_held_answer_survives_the_failures_that_follow():
     assert_same(held, expected)
 
 
-def test_a_step_that_fails_is_answered_or_refused_and_the_next_are_right():
+def test_a_step_that_fails_is_answered_or_rejected_and_the_next_are_right():
     """Keeping the last positions may fail as well: then RuntimeError says so, and stepping begins again."""
     scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(3), 10)])
     cpu = hc.Detector(scene, backend="cpu")
     expected = cpu.detect(t0, t1)
     given = [cupy.asarray(t) for t in (t0, t1)]
     detector = hc.Detector(scene, backend="gpu", threads=2, results="device")
-    answered = refused = 0
+    answered = rejected = 0
     for n in range(1, 80):
         detector.reset()
         detector.step(given[0])
@@ -110,11 +110,11 @@ def test_a_step_that_fails_is_answered_or_refused_and_the_next_are_right():
         except RuntimeError as error:
             _core.gpu_fail_after(0)
             assert "asked for by a test" in str(error)
-            refused += 1
+            rejected += 1
         detector.reset()
         detector.step(given[0])
         assert_same(detector.step(given[1]), expected)
-    assert answered > 20 and refused < 10
+    assert answered > 20 and rejected < 10
 
 
 def test_bad_coordinates_between_failures():

@@ -201,7 +201,7 @@ def test_nothing_to_look_at(n_vertices):
         assert len(detection.contacts()) == 0
 
 
-def test_refused():
+def test_rejected():
     scene, t0, t1 = crumpled(6, 8)
     ends = [cupy.asarray(t) for t in (t0, t1)]
     detector = hc.Detector(scene, backend="gpu", results="device")

@@ -232,7 +232,7 @@ def test_a_named_stream_alone_is_waited_for(spin, worlds, results, ask):
 
 
 @pytest.mark.parametrize("where", ("device", "host"))
-def test_a_stream_that_is_captured_is_refused(where):
+def test_a_stream_that_is_captured_is_rejected(where):
     """Its work is not done before the graph is launched. The caller's mistake: the GPU is not given up for it."""
     scene, t0, t1 = crumpled()
     expected = hc.Detector(scene, backend="cpu").detect(t0, t1)
@@ -262,7 +262,7 @@ def test_a_stream_that_is_captured_is_refused(where):
     assert detector.backend == "gpu"
 
 
-def test_a_stream_of_another_device_is_refused():
+def test_a_stream_of_another_device_is_rejected():
     if cupy.cuda.runtime.getDeviceCount() < 2:
         pytest.skip("one GPU")
     scene, t0, t1 = crumpled()
@@ -302,7 +302,7 @@ assert detector.stats["gpu_fallbacks"] == 0, detector.last_gpu_error
 
 
 def test_a_stream_that_is_no_more_never_counts_as_a_failure_of_the_gpu():
-    """In a process of its own: CUDA may refuse the handle, not notice, or crash."""
+    """In a process of its own: CUDA may reject the handle, not notice, or crash."""
     folders = [Path(hc.__file__).parents[1], Path(__file__).parent]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([*map(str, folders), os.environ.get("PYTHONPATH", "")])}
     done = subprocess.run([sys.executable, "-c", NO_MORE], env=environment, capture_output=True, text=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`hpccd param` reads and sets what the node has, and shows why it refuses."""
+"""`hpccd param` reads and sets what the node has, and shows why it rejects."""
 
 import pytest
 
@@ -58,7 +58,7 @@ def test_set(param, name, given, shown):
         (("get",), "get: got no NAME; write hpccd param get NAME"),
     ],
 )
-def test_refusals(param, node, arguments, says):
+def test_rejections(param, node, arguments, says):
     done = param(*arguments)
     assert done.returncode == 2 and says.replace("NODE", f"{node.namespace}/hpccd") in done.stderr
     assert done.stderr.startswith("hpccd param: ") and done.stderr.count("\n") == 1

@@ -32,31 +32,31 @@ def test_what_is_too_large_or_of_no_use_is_not_kept(names, positions):
     assert joint_messages.kept(JointState(name=["j" * 1_000_000], position=[0.0])) is None
 
 
-def test_a_message_of_velocities_alone_is_kept_and_not_refused():
+def test_a_message_of_velocities_alone_is_kept_and_not_rejected():
     message = crane.joint_state(1, 1)
     message.position, message.velocity = [], [0.0, 0.0]
     for given in (message, joint_messages.kept(message)):
         assert joint_messages.fill([frames()], given, "joint_states") == []
 
 
-def test_what_no_robot_can_use_is_refused_before_any_is_known():
+def test_what_no_robot_can_use_is_rejected_before_any_is_known():
     message = crane.joint_state(1, 1)
     assert joint_messages.fill([], message, "joint_states") == []
     message.position = message.position[:1]
-    (refusal,) = joint_messages.fill([], message, "joint_states")
-    assert "2 names and 1 position" in refusal.text
+    (rejection,) = joint_messages.fill([], message, "joint_states")
+    assert "2 names and 1 position" in rejection.text
     message = crane.joint_state(1, 1)
     message.header.stamp.sec = -1
-    (refusal,) = joint_messages.fill([], message, "joint_states")
-    assert "stamp has sec -1" in refusal.text
+    (rejection,) = joint_messages.fill([], message, "joint_states")
+    assert "stamp has sec -1" in rejection.text
 
 
 @pytest.mark.parametrize("first", [True, False])
 def test_what_one_robot_cannot_use_moves_the_others(first):
     sound, broken = frames(), frames("spin")
     message = JointState(name=["turn", "reach", "spin"], position=[0.0, 0.0, float("nan")])
-    (refusal,) = joint_messages.fill([sound, broken] if first else [broken, sound], message, "joint_states")
-    assert "'spin' is nan in the joint state of 0 ns" in refusal.text
+    (rejection,) = joint_messages.fill([sound, broken] if first else [broken, sound], message, "joint_states")
+    assert "'spin' is nan in the joint state of 0 ns" in rejection.text
     assert sound.latest(None) == [0]
     with pytest.raises(LookupError, match="^crane: 'spin' is nan in the joint state of 0 ns$"):
         broken.latest(None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages <-> numpy: views where possible, each kind of bad message refused with its reason."""
+"""Messages <-> numpy: views where possible, each kind of bad message rejected with its reason."""
 
 import math
 from array import array
@@ -24,7 +24,7 @@ LIMITS = {"max_vertices": 100, "max_faces": 100, "max_edges": 100}
 POINTS = np.arange(12, dtype=np.float32).reshape(4, 3) * 0.5
 
 
-def refused(reason, read, *args):
+def rejected(reason, read, *args):
     with pytest.raises(InvalidMessageError) as caught:
         read(*args)
     assert caught.value.reason == reason
@@ -42,10 +42,10 @@ BAD_STAMPS = [Time(nanosec=10**9), Time(sec=2**31 - 1, nanosec=2**32 - 1), Time(
 
 @pytest.mark.parametrize("stamp", BAD_STAMPS, ids=["nanosec", "last second", "negative", "most negative"])
 def test_stamps_that_are_no_time(stamp):
-    assert str(stamp.sec) in refused(Reason.MALFORMED, fields.stamp_to_ns, stamp)
+    assert str(stamp.sec) in rejected(Reason.MALFORMED, fields.stamp_to_ns, stamp)
     topology = mesh_messages.topology_message(np.array([[0, 1, 2]]), 3)
     topology.header.stamp = stamp
-    refused(Reason.MALFORMED, mesh_messages.topology_from_message, topology, LIMITS)
+    rejected(Reason.MALFORMED, mesh_messages.topology_from_message, topology, LIMITS)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64, np.uint32, np.uint8])
@@ -74,13 +74,13 @@ def test_bad_topologies():
     def message(faces, n, edges=()):
         return MeshTopology(n_vertices=n, faces=array("I", faces), edges=array("I", edges))
 
-    assert "face 1 names vertex 3" in refused(Reason.INDEX_RANGE, read, message([0, 1, 2, 0, 2, 3], 3), LIMITS)
-    assert "edge 1 names vertex 4" in refused(Reason.INDEX_RANGE, read, message([], 4, [0, 1, 4, 3]), LIMITS)
-    refused(Reason.MALFORMED, read, message([0, 1], 3), LIMITS)
-    assert "edges has 3 indices" in refused(Reason.MALFORMED, read, message([0, 1, 2], 3, [0, 1, 2]), LIMITS)
-    refused(Reason.TOO_LARGE, read, message([0, 1, 2] * 3, 3), limits)
-    assert "max_edges" in refused(Reason.TOO_LARGE, read, message([0, 1, 2] * 2, 3, [0, 1] * 4), limits)
-    refused(Reason.TOO_LARGE, read, message([0, 1, 2], 101), limits)
+    assert "face 1 names vertex 3" in rejected(Reason.INDEX_RANGE, read, message([0, 1, 2, 0, 2, 3], 3), LIMITS)
+    assert "edge 1 names vertex 4" in rejected(Reason.INDEX_RANGE, read, message([], 4, [0, 1, 4, 3]), LIMITS)
+    rejected(Reason.MALFORMED, read, message([0, 1], 3), LIMITS)
+    assert "edges has 3 indices" in rejected(Reason.MALFORMED, read, message([0, 1, 2], 3, [0, 1, 2]), LIMITS)
+    rejected(Reason.TOO_LARGE, read, message([0, 1, 2] * 3, 3), limits)
+    assert "max_edges" in rejected(Reason.TOO_LARGE, read, message([0, 1, 2] * 2, 3, [0, 1] * 4), limits)
+    rejected(Reason.TOO_LARGE, read, message([0, 1, 2], 101), limits)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -100,16 +100,16 @@ def test_vertices_of_another_type_are_not_sent():
 
 def test_bad_vertices():
     read = mesh_messages.vertices_from_message
-    refused(Reason.MALFORMED, read, MeshVertices(), 100)
+    rejected(Reason.MALFORMED, read, MeshVertices(), 100)
     both = MeshVertices(vertices_f32=array("f", [0] * 3), vertices_f64=array("d", [0] * 3))
-    refused(Reason.MALFORMED, read, both, 100)
-    refused(Reason.MALFORMED, read, MeshVertices(vertices_f32=array("f", [0] * 4)), 100)
-    refused(Reason.TOO_LARGE, read, mesh_messages.vertices_message(POINTS, 0), 3)
+    rejected(Reason.MALFORMED, read, both, 100)
+    rejected(Reason.MALFORMED, read, MeshVertices(vertices_f32=array("f", [0] * 4)), 100)
+    rejected(Reason.TOO_LARGE, read, mesh_messages.vertices_message(POINTS, 0), 3)
     for bad in (math.nan, math.inf, -math.inf):
         for dtype in (np.float32, np.float64):
             points = POINTS.astype(dtype)
             points[2, 1] = bad
-            assert "vertex 2" in refused(Reason.NOT_FINITE, read, mesh_messages.vertices_message(points, 0), 100)
+            assert "vertex 2" in rejected(Reason.NOT_FINITE, read, mesh_messages.vertices_message(points, 0), 100)
 
 
 @pytest.mark.parametrize("largest", [np.full((4, 3), np.finfo("f4").max), np.full((4, 3), 1e150)], ids=["f4", "f8"])
@@ -123,11 +123,11 @@ def test_coordinates_beyond_what_the_core_takes():
         points = POINTS.astype(np.float64)
         points[2, 1] = bad
         message = mesh_messages.vertices_message(points, 0)
-        text = refused(Reason.OUT_OF_RANGE, mesh_messages.vertices_from_message, message, 100)
+        text = rejected(Reason.OUT_OF_RANGE, mesh_messages.vertices_from_message, message, 100)
         assert "vertex 2" in text and "1e+150" in text
-        refused(Reason.OUT_OF_RANGE, mesh_messages.vertices_from_cloud, cloud(points, kinds=[F64] * 3), 100)
+        rejected(Reason.OUT_OF_RANGE, mesh_messages.vertices_from_cloud, cloud(points, kinds=[F64] * 3), 100)
         points[3, 0] = math.nan
-        assert "vertex 3" in refused(
+        assert "vertex 3" in rejected(
             Reason.NOT_FINITE, mesh_messages.vertices_from_message, mesh_messages.vertices_message(points, 0), 100
         )
 
@@ -195,33 +195,33 @@ def test_any_cloud_layout(data):
 
 def test_bad_clouds():
     read = mesh_messages.vertices_from_cloud
-    assert "swap the bytes" in refused(Reason.BIG_ENDIAN, read, cloud(POINTS, big=True), 100)
-    assert "'z'" in refused(Reason.MALFORMED, read, cloud(POINTS, names="xyw"), 100)
+    assert "swap the bytes" in rejected(Reason.BIG_ENDIAN, read, cloud(POINTS, big=True), 100)
+    assert "'z'" in rejected(Reason.MALFORMED, read, cloud(POINTS, names="xyw"), 100)
     integers = cloud(POINTS, kinds=[F32, PointField.INT32, F32])
-    assert "'y'" in refused(Reason.UNSUPPORTED_TYPE, read, integers, 100)
+    assert "'y'" in rejected(Reason.UNSUPPORTED_TYPE, read, integers, 100)
     several = cloud(POINTS)
     several.fields[0].count = 3
-    refused(Reason.UNSUPPORTED_TYPE, read, several, 100)
+    rejected(Reason.UNSUPPORTED_TYPE, read, several, 100)
     outside = cloud(POINTS)
     outside.fields[2].offset = 9
-    assert "point_step is 12" in refused(Reason.MALFORMED, read, outside, 100)
+    assert "point_step is 12" in rejected(Reason.MALFORMED, read, outside, 100)
     short = cloud(POINTS)
     short.data = short.data[:-1]
-    assert "need 48" in refused(Reason.MALFORMED, read, short, 100)
+    assert "need 48" in rejected(Reason.MALFORMED, read, short, 100)
     overlapping = cloud(POINTS, height=2)
     overlapping.row_step = 20
-    refused(Reason.MALFORMED, read, overlapping, 100)
-    refused(Reason.MALFORMED, read, PointCloud2(fields=cloud(POINTS).fields, point_step=12), 100)
-    refused(Reason.TOO_LARGE, read, cloud(POINTS), 3)
+    rejected(Reason.MALFORMED, read, overlapping, 100)
+    rejected(Reason.MALFORMED, read, PointCloud2(fields=cloud(POINTS).fields, point_step=12), 100)
+    rejected(Reason.TOO_LARGE, read, cloud(POINTS), 3)
     bad = POINTS.copy()
     bad[3, 0] = math.nan
-    refused(Reason.NOT_FINITE, read, cloud(bad), 100)
+    rejected(Reason.NOT_FINITE, read, cloud(bad), 100)
 
 
 def test_cloud_that_claims_to_be_huge():
     message = cloud(POINTS)
     message.width = message.height = 2**32 - 1
-    refused(Reason.TOO_LARGE, mesh_messages.vertices_from_cloud, message, 100)
+    rejected(Reason.TOO_LARGE, mesh_messages.vertices_from_cloud, message, 100)
 
 
 LAYOUT = Layout(("cloth", "ball", "floor"), np.array([0, 10, 14, 20]), np.array([0, 8, 12, 20]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters qos_overrides.*: in force on every topic of the node and in its recording; nonsense is refused, told."""
+"""Parameters qos_overrides.*: in force on every topic of the node and in its recording; nonsense is rejected, told."""
 
 import re
 import subprocess
@@ -125,7 +125,7 @@ def test_after_a_clean_up_what_is_not_overridden_follows_its_parameter(start_nod
         ("history", "keep_some", "'keep_some' is not valid; use one of keep_last, keep_all"),
     ],
 )
-def test_nonsense_is_refused(start_node, policy, value, text):
+def test_nonsense_is_rejected(start_node, policy, value, text):
     node = start_node({"qos_overrides": {"/contacts": {"publisher": {policy: value}}}}, wait=False)
     assert node.process.wait(timeout=PATIENCE) == 2
     assert f"hpccd: qos_overrides./contacts.publisher.{policy}: " in node.output() and text in node.output()

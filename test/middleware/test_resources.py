@@ -63,7 +63,7 @@ def test_uris_lead_to_files(share):
         ("https://host/x.obj", "scheme 'https'; use package://, file:// or a path"),
     ],
 )
-def test_uris_that_lead_nowhere_are_refused(share, uri, why):
+def test_uris_that_lead_nowhere_are_rejected(share, uri, why):
     with pytest.raises(MeshFileError, match=why) as caught:
         local_path(uri)
     assert len(str(caught.value)) < 800

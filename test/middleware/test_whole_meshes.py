@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""shape_msgs/Mesh and markers of triangles -> vertices and topology, and what is refused of them."""
+"""shape_msgs/Mesh and markers of triangles -> vertices and topology, and what is rejected of them."""
 
 import math
 import struct
@@ -127,7 +127,7 @@ BEYOND = VERTICES + [[0, 0, 0], [0, 0, 0], [0, 0, 0], [math.nan, 0, 0]]
         ("shape", shape(triangles=np.repeat(FACES, 51, axis=0)), Reason.TOO_LARGE, "triangles is 102, above"),
     ],
 )
-def test_what_is_refused(kind, message, reason, text):
+def test_what_is_rejected(kind, message, reason, text):
     with pytest.raises(InvalidMessageError) as caught:
         read(kind, message)
     assert caught.value.reason == reason and text in str(caught.value)
@@ -169,7 +169,7 @@ def test_the_other_order_of_bytes():
 
 @pytest.mark.parametrize("kind, message", [("marker", TEXTS), ("shape", shape_of(VERTICES, FACES))])
 def test_bytes_that_are_cut_off_or_changed(kind, message):
-    """Each is read as some mesh or refused, and none that ends before the vertices do is read."""
+    """Each is read as some mesh or rejected, and none that ends before the vertices do is read."""
     data = serialize_message(message)
     whole = read(kind, data)
     needed = data.index(VERTICES[3].tobytes()) + 24 if kind == "shape" else data.index(b"behind") - 60
@@ -177,7 +177,7 @@ def test_bytes_that_are_cut_off_or_changed(kind, message):
         with pytest.raises(InvalidMessageError):
             read(kind, data[:length])
     rng = np.random.default_rng(7)
-    refused = 0
+    rejected = 0
     for _ in range(3000):
         changed = bytearray(data)
         for place in rng.integers(0, len(data), rng.integers(1, 4)):
@@ -185,7 +185,7 @@ def test_bytes_that_are_cut_off_or_changed(kind, message):
         try:
             frame = read(kind, bytes(changed))
         except InvalidMessageError:
-            refused += 1
+            rejected += 1
         else:
             assert len(frame.vertices) == frame.topology.n_vertices > int(frame.topology.faces.max())
-    assert refused > 100 and np.array_equal(whole.vertices, VERTICES)
+    assert rejected > 100 and np.array_equal(whole.vertices, VERTICES)

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.frames.drops import Input, Reason, Rejection
 from hpccd_ros.frames.types import Outcome, SceneFrame, Topology
 from hpccd_ros.node.accounts import Accounts
 
@@ -18,19 +18,19 @@ def accounts():
 
 def test_what_came_of_a_message():
     of_node, log = accounts()
-    refusals = [
-        Refusal("cloth", Reason.RESTART),
-        Refusal("cloth", Reason.LATE, "stamp 3 ns was answered"),
-        Refusal("ball", Reason.OLD_TOPOLOGY, "version 1 is older", what=Input.TOPOLOGY),
-        Refusal("ball", Reason.MIDDLEWARE, "4 messages", messages=4),
+    rejections = [
+        Rejection("cloth", Reason.RESTART),
+        Rejection("cloth", Reason.LATE, "stamp 3 ns was answered"),
+        Rejection("ball", Reason.OLD_TOPOLOGY, "version 1 is older", what=Input.TOPOLOGY),
+        Rejection("ball", Reason.MIDDLEWARE, "4 messages", messages=4),
     ]
-    of_node.add(Outcome([FRAME], refusals, ["mesh cloth goes on: taken as a restart"], static_taken=2))
+    of_node.add(Outcome([FRAME], rejections, ["mesh cloth goes on: taken as a restart"], static_taken=2))
     assert of_node.dropped.by_mesh_and_reason() == {
         ("cloth", "restart"): 1,
         ("cloth", "late"): 1,
         ("ball", "middleware"): 4,
     }
-    assert of_node.topologies_refused.by_mesh_and_reason() == {("ball", "old_topology"): 1}
+    assert of_node.topologies_rejected.by_mesh_and_reason() == {("ball", "old_topology"): 1}
     assert (of_node.restarts, of_node.static_taken, of_node.metrics.snapshot()["answered"]) == (1, 2, 0)
     assert log == [
         "mesh cloth goes on: taken as a restart",

@@ -6,7 +6,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 from visualization_msgs.msg import Marker
 
-from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.frames.drops import Input, Reason, Rejection
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.markers import contact_markers
 from hpccd_ros.node.metrics import percentiles
@@ -54,9 +54,9 @@ def test_frames_and_detections():
 
 def test_drops_warn_once_and_stay_counted():
     node = Fixture()
-    node.accounts.refused(Refusal("cloth", Reason.OVERLOAD, messages=4))
-    node.accounts.refused(Refusal("ball", Reason.NOT_FINITE, "vertex 1 is nan"))
-    node.accounts.refused(Refusal("ball", Reason.OLD_TOPOLOGY, "version 1", what=Input.TOPOLOGY))
+    node.accounts.rejected(Rejection("cloth", Reason.OVERLOAD, messages=4))
+    node.accounts.rejected(Rejection("ball", Reason.NOT_FINITE, "vertex 1 is nan"))
+    node.accounts.rejected(Rejection("ball", Reason.OLD_TOPOLOGY, "version 1", what=Input.TOPOLOGY))
     level, text, values = node.report()["/hpccd: frames"]
     assert (
         level == DiagnosticStatus.WARN
@@ -64,20 +64,20 @@ def test_drops_warn_once_and_stay_counted():
         and "1 topology rejected" in text
     )
     assert values["dropped"] == "5" and values["dropped.overload"] == "4"
-    assert values["dropped.ball.not_finite"] == "1" and values["topologies_refused.ball.old_topology"] == "1"
-    assert values["last_refusal"] == "ball: old_topology: version 1"
+    assert values["dropped.ball.not_finite"] == "1" and values["topologies_rejected.ball.old_topology"] == "1"
+    assert values["last_rejection"] == "ball: old_topology: version 1"
     level, _, values = node.report()["/hpccd: frames"]
     assert level == DiagnosticStatus.STALE and values["dropped"] == "5"
 
 
-def test_what_moves_meshes_is_told_of_where_it_is_refused():
+def test_what_moves_meshes_is_told_of_where_it_is_rejected():
     node = Fixture()
-    for what, key in ((Input.JOINT_STATE, "joint_states_refused"), (Input.TRANSFORM, "transforms_refused")):
-        node.accounts.refused(Refusal("topic", Reason.MALFORMED, "stamp has sec -1", what=what))
+    for what, key in ((Input.JOINT_STATE, "joint_states_rejected"), (Input.TRANSFORM, "transforms_rejected")):
+        node.accounts.rejected(Rejection("topic", Reason.MALFORMED, "stamp has sec -1", what=what))
         level, text, values = node.report()["/hpccd: frames"]
         assert level == DiagnosticStatus.WARN and f"1 {what.removesuffix('s')} rejected" in text
         assert (values[key], values["dropped"]) == ("1", "0")
-        assert values["last_refusal"] == "topic: malformed: stamp has sec -1"
+        assert values["last_rejection"] == "topic: malformed: stamp has sec -1"
         level, text, values = node.report()["/hpccd: frames"]
         assert level == DiagnosticStatus.STALE and values[key] == "1"
 
@@ -112,7 +112,7 @@ def test_silent_inputs_are_named_and_stay_stale_while_nothing_comes():
 
 def test_one_and_many():
     node = Fixture()
-    node.accounts.refused(Refusal("cloth", Reason.OVERLOAD))
+    node.accounts.rejected(Rejection("cloth", Reason.OVERLOAD))
     assert node.report()["/hpccd: frames"][1] == "1 frame dropped (overload 1)"
     assert node.report(errors=(1, "x"))["/hpccd: errors"][1] == "1 unexpected error, the last: x"
 

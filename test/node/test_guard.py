@@ -158,8 +158,8 @@ def test_a_node_with_faults_goes_on(start_node):
 
     answer = call(node, SetParametersAtomically, "fail", SetParametersAtomically.Request()).result
     assert not answer.successful and "LookupError: request" in answer.reason
-    refused = set_parameter(node, "markers_max", 7)
-    assert not refused.successful and "LookupError: parameter" in refused.reason
+    rejected = set_parameter(node, "markers_max", 7)
+    assert not rejected.successful and "LookupError: parameter" in rejected.reason
 
     node.peer.topology("cloth", sheet_faces(N), N * N)
     stream(node, range(2))

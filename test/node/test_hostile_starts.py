@@ -257,7 +257,7 @@ def test_a_log_that_cannot_be_written_keeps_no_node_from_starting(variables):
         ("RMW_IMPLEMENTATION", "a/b", 2),
     ],
 )
-def test_settings_of_the_environment_that_ros_refuses(variable, value, status):
+def test_settings_of_the_environment_that_ros_rejects(variable, value, status):
     done = subprocess.run(
         [sys.executable, "-m", "hpccd_ros.node"],
         cwd=ROOT,

@@ -120,7 +120,7 @@ def own_mb(pid):
 
 
 def test_the_node_shrinks_again_after_a_large_message(tmp_path):
-    """20 MB that it refuses: in the middleware, in Python, and as an array. One of these may stay, in the arena of the
+    """20 MB that it rejects: in the middleware, in Python, and as an array. One of these may stay, in the arena of the
     thread that received it."""
     namespace = f"/shrinks{os.getpid()}"
     parameters = tmp_path / "node.yaml"

@@ -70,7 +70,7 @@ def test_a_request_given_up_after_its_answer_spoils_nothing():
     assert answer(kept, request(0)).collision_free_step == expected
 
 
-def test_a_refused_request_leaves_what_others_left():
+def test_a_rejected_request_leaves_what_others_left():
     kept = KeptDetectors(2)
     answer(kept, request(0))
     first = detector_in(kept)

@@ -106,7 +106,7 @@ class Caller:
 
 
 def check_answer(request, answer):
-    """It says why, where it refuses."""
+    """It says why, where it rejects."""
     if isinstance(request, SetParameters.Request):
         assert len(answer.results) == len(request.parameters)
         assert all(result.successful or result.reason for result in answer.results), request
@@ -118,7 +118,7 @@ def check_answer(request, answer):
 
 
 class Streamer(threading.Thread):
-    """Publishes both meshes, now and then what must be refused, until `end` is set."""
+    """Publishes both meshes, now and then what must be rejected, until `end` is set."""
 
     def __init__(self, namespace, monkey):
         super().__init__(name="streamer")
@@ -225,7 +225,7 @@ def test_anything_in_any_order(start_node, tmp_path, seconds):
 
     assert caller.now("detect", Detect.Request()).message
     caller.settle()
-    ends = {"answered", "refused", "busy", "timed_out", "failed", "stopped", "canceled"}
+    ends = {"answered", "rejected", "busy", "timed_out", "failed", "stopped", "canceled"}
 
     def counted():
         values = node.peer.statuses.get("service", (b"", "", {}))[2]

@@ -166,8 +166,8 @@ def test_cancelling_a_goal_that_waits(start_node):
 
 @pytest.mark.parametrize("bad, text", BAD, ids=BAD_IDS)
 def test_bad_goals_are_aborted_with_a_reason(node, bad, text):
-    refused, good = Goals(node).send_all([bad, request()])
-    status, result = refused.ended()
+    rejected, good = Goals(node).send_all([bad, request()])
+    status, result = rejected.ended()
     assert status == ABORTED and not result.success and text in result.message, result.message
     assert len(result.contacts.toc) == 0 and len(result.message) < 1200
     assert good.ended()[0] == SUCCEEDED, "the node goes on"

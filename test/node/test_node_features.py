@@ -197,13 +197,13 @@ def test_whole_surfaces_have_none(node, query):
         got = client.distances_from_message(answer.distances)
         for gap in core.distances(frame(1)):
             assert got.between(gap.mesh_a, gap.mesh_b) == gap.distance
-    refused = ask(node, request(query, features=["edge_edge"]))
+    rejected = ask(node, request(query, features=["edge_edge"]))
     said = f"features: only queries contacts, collision_free_step, proximity have some, leave them empty for {query}"
-    assert not refused.success and said in refused.message
+    assert not rejected.success and said in rejected.message
 
 
 @pytest.mark.parametrize("features", [["faces"], [""], ["vertex_face", "x" * 1_000_000]], ids=["word", "empty", "1MB"])
-def test_bad_names_are_refused(node, features):
+def test_bad_names_are_rejected(node, features):
     answer = ask(node, request(features=features))
     assert not answer.success and "is not known; use one of vertex_face, edge_edge" in answer.message
     assert len(answer.message) < 1200

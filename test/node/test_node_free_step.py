@@ -175,7 +175,7 @@ NAN_VERTEX.start[1].vertices_f64[4] = math.nan
     ],
     ids="report any distance nan-separation separation query accuracy limit start end names nan".split(),
 )
-def test_wrong_requests_are_refused_and_the_node_goes_on(node, asked, text):
+def test_wrong_requests_are_rejected_and_the_node_goes_on(node, asked, text):
     answer = ask(node, asked)
     assert not answer.success and text in answer.message, answer.message
     assert math.isnan(answer.collision_free_step), "no number that a step could be taken by"

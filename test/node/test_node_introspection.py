@@ -50,8 +50,8 @@ def test_events_of_the_service(start_node):
     asked, answered = heard[2].request[0], heard[3].response[0]
     assert list(asked.mesh_names) == ["hand", "table"] and len(asked.end) == 2
     assert answered.contacts == answer.contacts and answered.contacts.total > 0
-    refused = set_parameter(node, "service_introspection", "some")
-    assert not refused.successful and "'some' is not valid; use one of off, metadata, contents" in refused.reason
+    rejected = set_parameter(node, "service_introspection", "some")
+    assert not rejected.successful and "'some' is not valid; use one of off, metadata, contents" in rejected.reason
     assert set_parameter(node, "service_introspection", "off").successful
     ask(node, service)
     assert set_parameter(node, "service_introspection", "metadata").successful

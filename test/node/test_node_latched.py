@@ -44,12 +44,12 @@ def test_the_last_answers_are_kept_for_those_who_ask(start_node):
 def test_volatile_is_the_default_and_a_clean_up_takes_what_is_set(start_node):
     node = answered(start_node({"meshes": ["cloth"]}), 2)
     assert late(node, client.CONTACTS_QOS, 0) == []
-    refused = set_parameter(node, "contacts_durability", "transient_local")
-    assert not refused.successful and "read-only while the node is configured" in refused.reason
+    rejected = set_parameter(node, "contacts_durability", "transient_local")
+    assert not rejected.successful and "read-only while the node is configured" in rejected.reason
     assert change_state(node, Transition.TRANSITION_DEACTIVATE) and change_state(node, Transition.TRANSITION_CLEANUP)
-    refused = set_parameter(node, "contacts_durability", "persistent")
+    rejected = set_parameter(node, "contacts_durability", "persistent")
     assert (
-        not refused.successful and "'persistent' is not valid; use one of volatile, transient_local" in refused.reason
+        not rejected.successful and "'persistent' is not valid; use one of volatile, transient_local" in rejected.reason
     )
     assert set_parameter(node, "contacts_durability", "transient_local").successful
     assert change_state(node, Transition.TRANSITION_CONFIGURE) and change_state(node, Transition.TRANSITION_ACTIVATE)

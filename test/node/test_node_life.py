@@ -163,7 +163,7 @@ def label_of(node, label):
     return call(node, ChangeState, "change_state", request).success
 
 
-def test_transitions_that_the_state_does_not_have_are_refused(start_node):
+def test_transitions_that_the_state_does_not_have_are_rejected(start_node):
     """What is asked for in the wrong state or does not exist at all is answered, and changes nothing."""
     node = start_node({"meshes": ["cloth"]})
     node.peer.topology("cloth", FACES, N * N)
@@ -281,7 +281,7 @@ def test_markers_are_asked_for_while_a_step_is_detected(start_node):
         assert values["answered"] == values["received"] and values["dropped"] == "0", node.output()
 
 
-def test_values_of_a_type_that_does_not_exist_are_refused(start_node):
+def test_values_of_a_type_that_does_not_exist_are_rejected(start_node):
     node = start_node({"meshes": ["cloth"]})
     good = Parameter("report", value="first").to_parameter_msg()
     bad = Parameter("accuracy", value="fast").to_parameter_msg()

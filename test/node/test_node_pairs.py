@@ -70,8 +70,8 @@ def test_given_changed_and_replayed(start_node, tmp_path, hpccd):
             "mesh.nte.frame: the node has no such parameter; docs/parameters.md lists all; did you mean mesh.net.fr",
         ),
     ):
-        refused = set_parameter(node, name, value)
-        assert not refused.successful and reason in refused.reason, refused.reason
+        rejected = set_parameter(node, name, value)
+        assert not rejected.successful and reason in rejected.reason, rejected.reason
     assert_same_contacts(send(node, 4), frame(3), frame(4), scene(2e-3))
     assert node.stop() == 0
     done = hpccd("replay", path)

@@ -157,7 +157,7 @@ def test_streamed_recorded_and_verified(start_node, tmp_path, by):
     assert [step.bounds.parts for step in steps][-2:] == [coarse.parts, 64] and len(steps) == 9
 
 
-def test_what_is_wrong_with_poses_is_refused_and_said(start_node):
+def test_what_is_wrong_with_poses_is_rejected_and_said(start_node):
     node = start_node({"meshes": ["blade"], "mesh.blade.input": "pose"})
     publisher = node.peer.publisher(PoseStamped, client.pose_topic("blade"))
     publisher.publish(stamped(1))
@@ -199,7 +199,7 @@ def test_each_file_of_a_split_recording_has_the_shape(start_node, tmp_path):
     verified = 0
     for file in files:
         replay, _ = replayed(file)
-        assert not replay.diverged and not any(counter.total for counter in replay.source.refused.values())
+        assert not replay.diverged and not any(counter.total for counter in replay.source.rejected.values())
         verified += replay.verified
     assert verified > 2
 

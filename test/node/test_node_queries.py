@@ -170,7 +170,7 @@ def test_meshes_that_intersect_and_meshes_far_apart(node):
         (request(start=False), "start: 0 entries for 2 meshes"),
     ],
 )
-def test_bad_requests_are_refused_with_a_reason(node, asked, text):
+def test_bad_requests_are_rejected_with_a_reason(node, asked, text):
     answer = ask(node, asked)
     assert not answer.success and text in answer.message, answer.message
     assert answer.contacts.total == len(answer.distances.distance) == 0

@@ -100,10 +100,10 @@ def test_begun_and_ended_at_run_time(start_node, tmp_path):
     second = first.with_name(f"{first.stem}-1.mcap")
     assert examine(first).sound and examine(second).sound
     assert [step.step for step in _replayed(first)] == [0] * 5
-    refused = set_parameter(node, "record", str(first / "no" / "folder"))
-    assert not refused.successful and f"the folder {first} is not writable" in refused.reason
-    refused = set_parameter(node, "record_split_size", 1.0)
-    assert not refused.successful and "cannot split the single file" in refused.reason
+    rejected = set_parameter(node, "record", str(first / "no" / "folder"))
+    assert not rejected.successful and f"the folder {first} is not writable" in rejected.reason
+    rejected = set_parameter(node, "record_split_size", 1.0)
+    assert not rejected.successful and "cannot split the single file" in rejected.reason
 
 
 def test_a_full_disk_stops_only_the_recording(start_node, tmp_path):
@@ -161,18 +161,18 @@ def _settings_with(record):
 
 
 @pytest.mark.parametrize("record, why", IMPOSSIBLE.values(), ids=IMPOSSIBLE)
-def test_impossible_places_are_refused_with_a_reason(tmp_path, record, why):
-    refused = node_recording.unrecordable(_settings_with(record.format(folder=tmp_path)))
-    assert refused.startswith("record: ") and why in refused and len(refused) < 400, refused
+def test_impossible_places_are_rejected_with_a_reason(tmp_path, record, why):
+    rejected = node_recording.unrecordable(_settings_with(record.format(folder=tmp_path)))
+    assert rejected.startswith("record: ") and why in rejected and len(rejected) < 400, rejected
 
 
-def test_a_running_node_refuses_them_too(start_node, tmp_path):
+def test_a_running_node_rejects_them_too(start_node, tmp_path):
     """Those that can be sent: DDS has no strings with a NUL or half a character."""
     node = start_node({"meshes": ["cloth"]})
     for name in IMPOSSIBLE.keys() - {"nul", "no text"}:
         record, why = IMPOSSIBLE[name]
-        refused = set_parameter(node, "record", record.format(folder=tmp_path))
-        assert not refused.successful and why in refused.reason, (name, refused.reason)
+        rejected = set_parameter(node, "record", record.format(folder=tmp_path))
+        assert not rejected.successful and why in rejected.reason, (name, rejected.reason)
     node.peer.topology("cloth", FACES, N * N)
     stream(node, range(2))
     assert set_parameter(node, "record", str(tmp_path / ("x" * 230) / "run.mcap")).successful

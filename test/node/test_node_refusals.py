@@ -72,7 +72,7 @@ def streaming(start_node):
         before = len(node.peer.received)
         send(2)
         message = node.contacts(before + 1)[before]
-        assert fields.stamp_to_ns(message.start) == 11, "the refused frame is not a start either"
+        assert fields.stamp_to_ns(message.start) == 11, "the rejected frame is not a start either"
         expected = sheet_positions(N, 1), sheet_positions(N, 2)
         assert_same_contacts(message, *expected, scene_of(cloth=FACES))
         return message
@@ -91,7 +91,7 @@ def test_bad_vertices(streaming, kind):
         message.topology_version = 3
     node.peer.publisher(MeshVertices, "meshes/cloth/vertices").publish(message)
     values = node.frames_status(dropped=1, **{f"dropped__cloth__{reason}": 1})
-    assert text in values["last_refusal"]
+    assert text in values["last_rejection"]
     answer = goes_on()
     assert answer.dropped_frames == 1
     node.frames_status(received=4, answered=3, dropped=1, waiting=0)
@@ -108,7 +108,7 @@ def test_what_cannot_be_deserialised_is_told_as_such(streaming):
     for count in (1, 2):
         publisher.publish(UNREADABLE)
         values = node.frames_status(dropped=count, dropped__cloth__malformed=count)
-    assert "cannot be deserialised" in values["last_refusal"] and "input_depth" not in node.output()
+    assert "cannot be deserialised" in values["last_rejection"] and "input_depth" not in node.output()
     for _ in range(5):  # how many these are is known at the next that is read
         publisher.publish(UNREADABLE)
     node.wait_until(lambda: int(node.peer.statuses["frames"][2]["dropped"]) >= 3, "count of the unreadable ones")
@@ -121,8 +121,8 @@ def test_what_cannot_be_deserialised_is_told_as_such(streaming):
 def test_a_topology_that_cannot_be_deserialised_is_told(streaming):
     node, goes_on = streaming
     node.peer.publisher(MeshTopology, "meshes/cloth/topology").publish(UNREADABLE)
-    values = node.frames_status(topologies_refused=1, topologies_refused__cloth__malformed=1)
-    assert "cannot be deserialised" in values["last_refusal"]
+    values = node.frames_status(topologies_rejected=1, topologies_rejected__cloth__malformed=1)
+    assert "cannot be deserialised" in values["last_rejection"]
     goes_on()
 
 
@@ -146,8 +146,8 @@ def bad_topology(faces, n_vertices=N * N, version=4):
 def test_bad_topology(streaming, message, reason, text):
     node, goes_on = streaming
     node.peer.publisher(MeshTopology, "meshes/cloth/topology").publish(message)
-    values = node.frames_status(topologies_refused=1, **{f"topologies_refused__cloth__{reason}": 1})
-    assert text in values["last_refusal"]
+    values = node.frames_status(topologies_rejected=1, **{f"topologies_rejected__cloth__{reason}": 1})
+    assert text in values["last_rejection"]
     goes_on()
 
 
@@ -162,7 +162,7 @@ def test_a_triangle_that_names_a_vertex_twice_is_a_segment(start_node):
         node.frames_status(answered=k + 1)
     message = node.contacts(1)[0]
     assert assert_same_contacts(message, start, end, scene_of(cloth=faces)) > 0, "vertex 2 goes through it"
-    assert node.peer.statuses["frames"][2].get("topologies_refused", "0") == "0"
+    assert node.peer.statuses["frames"][2].get("topologies_rejected", "0") == "0"
 
 
 def test_a_conflict_right_behind_the_topology_does_not_replace_it(start_node):
@@ -171,7 +171,7 @@ def test_a_conflict_right_behind_the_topology_does_not_replace_it(start_node):
     publisher = node.peer.publisher(MeshTopology, "meshes/cloth/topology", qos.TOPOLOGY_INPUT)
     for faces in (FACES, FACES[1:]):
         publisher.publish(mesh_messages.topology_message(faces, N * N, version=3))
-    node.frames_status(topologies_refused=1, topologies_refused__cloth__topology_conflict=1)
+    node.frames_status(topologies_rejected=1, topologies_rejected__cloth__topology_conflict=1)
     for k in range(2):
         node.peer.vertices("cloth", sheet_positions(N, k), k, topology_version=3)
         node.frames_status(answered=k + 1)
@@ -246,7 +246,7 @@ def test_vertices_without_a_topology(start_node):
     for k in range(5):
         node.peer.vertices("cloth", GOOD, k)
     values = node.frames_status(received=5, waiting=2, dropped__cloth__no_topology=3)
-    assert "meshes/cloth/topology" in values["last_refusal"]
+    assert "meshes/cloth/topology" in values["last_rejection"]
 
 
 def test_incompatible_qos_is_told(start_node):
@@ -300,7 +300,7 @@ def test_no_time_is_hidden_by_a_frame_that_cannot_be_tested(start_node):
         node.peer.vertices("cloth", scale * sheet_positions(N, k, dtype=np.float64), k)
         node.frames_status(received=k + 1, waiting=0)
     values = node.frames_status(answered=2, dropped=2, dropped__cloth__out_of_range=2)
-    assert "1e+150" in values["last_refusal"]
+    assert "1e+150" in values["last_rejection"]
     (message,) = node.contacts(1)
     assert (fields.stamp_to_ns(message.start), fields.stamp_to_ns(message.header.stamp)) == (1, 3)
     assert_same_contacts(message, *(sheet_positions(N, k, dtype=np.float64) for k in (1, 3)), scene_of(cloth=FACES))

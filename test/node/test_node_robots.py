@@ -180,7 +180,7 @@ def test_a_robot_alone_moves_at_the_times_of_its_joint_states(start_node):
     far.position[0] = 1e10
     publisher.publish(far)
     values = node.frames_status(dropped__out_of_range=3)
-    assert "positions: not finite, or beyond 1e+09, for turn" in values["last_refusal"]
+    assert "positions: not finite, or beyond 1e+09, for turn" in values["last_rejection"]
 
 
 def test_a_base_that_moves_by_transforms(start_node):
@@ -220,11 +220,11 @@ def test_frames_wait_for_joint_states_and_take_what_lies_between_two(start_node)
     wrong = crane.joint_state(1, 20)
     wrong.position = wrong.position[:1]
     joints.publish(wrong)
-    node.frames_status(joint_states_refused=1)
+    node.frames_status(joint_states_rejected=1)
     not_finite = crane.joint_state(1, 20)
     not_finite.position[1] = float("nan")
     joints.publish(not_finite)
-    node.frames_status(joint_states_refused=2)
+    node.frames_status(joint_states_rejected=2)
     cloth(node, 20)  # waits for `reach`; `turn` of that message is known
     awaited = "the last position of reach is of 15 ns, before the stamp 20 ns; 'reach' is nan in the joint state of 20"
     node.wait_until(lambda: awaited in node.peer.statuses["frames"][1], "joint and message")
@@ -306,8 +306,8 @@ def test_a_file_that_cannot_be_used_ends_the_start(start_node, tmp_path):
             ("joint_states", "a b", "this name cannot be used"),
             ("srdf", "~nosuchuser/crane.srdf", "no such home folder"),
         ):
-            refused = set_parameter(node, f"robot.crane.{parameter}", value)
-            assert not refused.successful and reason in refused.reason, refused.reason
+            rejected = set_parameter(node, f"robot.crane.{parameter}", value)
+            assert not rejected.successful and reason in rejected.reason, rejected.reason
         file.write_text(crane.URDF)  # fixed while the node runs
         for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
             assert change_state(node, transition)
@@ -355,8 +355,8 @@ def test_pairs_name_robots_and_links(start_node):
     describe(node)
     first_step(node)
     answer = node.contacts(1)[-1]  # the description is in use
-    refused = set_parameter(node, "pair_separation", ["crane/hoek:cloth:0.02"])
-    assert not refused.successful and "'crane' has no link of this name" in refused.reason, refused.reason
+    rejected = set_parameter(node, "pair_separation", ["crane/hoek:cloth:0.02"])
+    assert not rejected.successful and "'crane' has no link of this name" in rejected.reason, rejected.reason
     assert not set_parameter(node, "pair_separation", ["crane/:cloth:0.02"]).successful
     names = list(answer.mesh_names)
     told = {
@@ -410,7 +410,7 @@ def test_the_description_in_use_that_comes_again_ends_the_complaint_about_anothe
     node.wait_until(lambda: "stays in use" not in node.peer.statuses["frames"][1], "the first one again")
 
 
-def test_a_recording_with_a_description_that_was_refused_is_verified(start_node, tmp_path):
+def test_a_recording_with_a_description_that_was_rejected_is_verified(start_node, tmp_path):
     path = tmp_path / "run.mcap"
     node = start_node({**parameters(**JOINTS), "record": str(path), "frame_queue": 5})
     node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
@@ -435,24 +435,24 @@ def test_joint_states_that_cannot_be_used_are_told_of_before_the_robot_is_known(
     short, endless = crane.joint_state(1, 1), crane.joint_state(1, 1)
     short.position = short.position[:1]
     joints.publish(short)
-    values = node.frames_status(joint_states_refused=1)
+    values = node.frames_status(joint_states_rejected=1)
     assert (
-        values["last_refusal"] == "joint_states: malformed: joint states: 2 names and 1 position; each joint "
+        values["last_rejection"] == "joint_states: malformed: joint states: 2 names and 1 position; each joint "
         "needs one of both"
     )
     joints.publish(JointState(name=[f"j{k}" for k in range(1001)], position=[0.0] * 1001))
-    values = node.frames_status(joint_states_refused=2)
-    assert "is not kept until the description of its robot comes" in values["last_refusal"]
+    values = node.frames_status(joint_states_rejected=2)
+    assert "is not kept until the description of its robot comes" in values["last_rejection"]
     endless.position[1] = float("inf")  # the robot is not known yet
     joints.publish(endless)
     joints.publish(crane.joint_state(1, 1))
     publisher = describe(node)
-    values = node.frames_status(joint_states_refused=3)
-    assert "'reach' is inf in the joint state of 1 ns; positions must be finite" in values["last_refusal"]
+    values = node.frames_status(joint_states_rejected=3)
+    assert "'reach' is inf in the joint state of 1 ns; positions must be finite" in values["last_rejection"]
     publisher.publish(String(data=crane.URDF.replace('"0.6 0.06 0.04"', '"0.9 0.06 0.04"')))
     node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
     cloth(node, 1)
-    assert node.frames_status(answered=4)["joint_states_refused"] == "3"
+    assert node.frames_status(answered=4)["joint_states_rejected"] == "3"
 
 
 def test_a_joint_state_stamped_far_ahead_is_left_out_and_told_of(start_node, tmp_path):
@@ -466,9 +466,9 @@ def test_a_joint_state_stamped_far_ahead_is_left_out_and_told_of(start_node, tmp
     joints.publish(crane.joint_state(4, 4))
     joints.publish(crane.joint_state(5, 5))
     cloth(node, 5)
-    values = node.frames_status(answered=16, dropped=0, joint_states_refused=1)
-    assert "one of stamp 3600000000000 ns came more than 10 s ahead" in values["last_refusal"]
-    assert values["last_refusal"].startswith("joint_states: stamp_ahead: ") and values["restarts"] == "0"
+    values = node.frames_status(answered=16, dropped=0, joint_states_rejected=1)
+    assert "one of stamp 3600000000000 ns came more than 10 s ahead" in values["last_rejection"]
+    assert values["last_rejection"].startswith("joint_states: stamp_ahead: ") and values["restarts"] == "0"
     assert node.stop() == 0
     with Recording(path) as recording:
         replay = Replay(recording, recorded_setup.of_recording(recording))
@@ -513,7 +513,7 @@ def test_a_robot_alone_goes_on_after_its_clock_was_set_back_by_less_than_a_secon
 
 
 @pytest.mark.parametrize("second", ["first", "second"])
-def test_mesh_files_of_a_refused_description_do_not_take_the_place_of_those_in_use(start_node, tmp_path, second):
+def test_mesh_files_of_a_rejected_description_do_not_take_the_place_of_those_in_use(start_node, tmp_path, second):
     path = tmp_path / "run.mcap"
 
     def described(folder, text):

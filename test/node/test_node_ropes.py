@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A rope of edges beside a cloth: streamed, refused, asked of ~/detect, recorded, computed again and drawn."""
+"""A rope of edges beside a cloth: streamed, rejected, asked of ~/detect, recorded, computed again and drawn."""
 
 import numpy as np
 from hpccd.srv import Detect
@@ -61,11 +61,11 @@ def test_streamed_recorded_verified_and_drawn(start_node, tmp_path, hpccd):
     assert picture.stat().st_size > 20_000
 
 
-def test_wrong_edges_are_refused_and_said(start_node):
+def test_wrong_edges_are_rejected_and_said(start_node):
     node = start_node({"meshes": ["rope"], "max_edges": SEGMENTS})
     for version, edges in enumerate(([[0, 1], [1, SEGMENTS + 1]], np.tile(EDGES, (2, 1)))):
         node.peer.topology("rope", NO_FACES, SEGMENTS + 1, version, edges=np.array(edges))
-    node.frames_status(topologies_refused__rope__index_range=1, topologies_refused__rope__too_large=1)
+    node.frames_status(topologies_rejected__rope__index_range=1, topologies_rejected__rope__too_large=1)
     node.peer.topology("rope", NO_FACES, SEGMENTS + 1, 2, edges=EDGES)
     for k in range(2):
         node.peer.vertices("rope", rope(k), stamp=k, frame_id="world", topology_version=2)

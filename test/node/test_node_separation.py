@@ -97,7 +97,7 @@ def test_given_at_the_start_and_changed_from_step_to_step(start_node):
         ("pair_separation", ["cloth:net:1", "net:cloth:2"], "contradicts 'cloth:net:1'"),
     ],
 )
-def test_bad_values_are_refused_with_a_reason(shared_stream, name, value, reason):
+def test_bad_values_are_rejected_with_a_reason(shared_stream, name, value, reason):
     answer = shared_stream.set(name, value)
     assert not answer.successful and reason in answer.reason, answer.reason
     shared_stream.expect(1e-3)

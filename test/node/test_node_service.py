@@ -109,15 +109,15 @@ def test_options_of_the_request(node):
 
 
 @pytest.mark.parametrize("bad, text", BAD, ids=BAD_IDS)
-def test_bad_requests_are_refused_with_a_reason(node, bad, text):
-    refused, good = ask(node, bad, request())
-    assert not refused.success and text in refused.message, refused.message
-    assert len(refused.contacts.toc) == 0 and len(refused.message) < 1200
+def test_bad_requests_are_rejected_with_a_reason(node, bad, text):
+    rejected, good = ask(node, bad, request())
+    assert not rejected.success and text in rejected.message, rejected.message
+    assert len(rejected.contacts.toc) == 0 and len(rejected.message) < 1200
     assert good.success, "the node goes on"
-    service_counts(node, answered=1, refused=1, failed=0)
+    service_counts(node, answered=1, rejected=1, failed=0)
 
 
-def test_busy_node_refuses_at_once(start_node):
+def test_busy_node_rejects_at_once(start_node):
     node = start_node({"meshes": ["cloth"], "detect_jobs": 1, "detect_waiting": 0})
     answers = ask(node, *(request(2, n=LARGE) for _ in range(4)))
     messages = [a.message for a in answers]

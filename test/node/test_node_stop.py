@@ -96,7 +96,7 @@ def test_an_edge_in_the_middle_of_a_face_stays_near(start_stream):
 
 
 @pytest.mark.parametrize("what", ["not finite", "count", "backward", "topology"])
-def test_what_is_refused_is_true_until_something_valid_of_the_mesh_comes(start_stream, what):
+def test_what_is_rejected_is_true_until_something_valid_of_the_mesh_comes(start_stream, what):
     stream = start_stream()
     stream.start()
     if what == "topology":
@@ -105,7 +105,7 @@ def test_what_is_refused_is_true_until_something_valid_of_the_mesh_comes(start_s
         bad = {"not finite": np.full((3, 3), math.nan), "count": np.zeros((4, 3)), "backward": hand(1.0)}[what]
         stream.node.peer.vertices("hand", bad, stamp=stream.sent + 1 if what != "backward" else 1)
     reason = {"not finite": "not_finite", "count": "wrong_vertex_count", "backward": "stamp_backward"}
-    stream.status("refused", f"of mesh hand rejected: {reason.get(what, 'topology_conflict')}")
+    stream.status("rejected", f"of mesh hand rejected: {reason.get(what, 'topology_conflict')}")
     stream.expect(True)
     stream.sent += 1
     if what == "topology":  # which one the positions belong to, they do not say
@@ -117,7 +117,7 @@ def test_what_is_refused_is_true_until_something_valid_of_the_mesh_comes(start_s
     stream.expect(False)
 
 
-def test_a_static_mesh_whose_new_place_is_refused_is_unknown(start_stream):
+def test_a_static_mesh_whose_new_place_is_rejected_is_unknown(start_stream):
     """Frames of the other mesh continue, but say nothing about this one, which may have moved."""
     stream = start_stream(mesh={"table": {"static": True}}, frame_queue=10)
     peer = stream.node.peer
@@ -135,21 +135,21 @@ def test_a_static_mesh_whose_new_place_is_refused_is_unknown(start_stream):
     hands()
     stream.expect(False)
     moved = TABLE + [0, 0, 1.9]
-    for refused, cause in (
+    for rejected, cause in (
         (lambda: peer.vertices("table", moved * math.nan, stamp=2, frame_id="world"), "not_finite"),
         (lambda: peer.vertices("table", moved[:2], stamp=2, frame_id="world"), "wrong_vertex_count"),
         (lambda: peer.topology("table", FACES + 9, 3, version=1), "index_range"),
         (lambda: peer.vertices("table", moved, stamp=2, frame_id="map"), "is not in use yet"),
     ):
-        refused()
+        rejected()
         if cause == "is not in use yet":
             taken += 1
             stream.node.frames_status(answered=stream.sent + taken)
             hands()
-        stream.status("refused", cause)
+        stream.status("rejected", cause)
         stream.expect(True)
         hands()
-        stream.status("refused", cause)
+        stream.status("rejected", cause)
         assert stream.listener.stop
         peer.topology("table", FACES, 3)
         peer.vertices("table", TABLE, stamp=2, frame_id="world")
@@ -182,9 +182,9 @@ def test_messages_that_cannot_be_deserialised(start_stream):
     def is_false():
         return not stream.listener.stop
 
-    def is_refused(text):
+    def is_rejected(text):
         _, message, values = peer.statuses.get("stop", (b"", "", {}))
-        return values.get("cause") == "refused" and text in message
+        return values.get("cause") == "rejected" and text in message
 
     static.publish(mount("mount"))
     peer.vertices("table", TABLE, stamp=1, frame_id="world")
@@ -195,7 +195,8 @@ def test_messages_that_cannot_be_deserialised(start_stream):
     # Either the message itself is noticed, or only the gap that it leaves before the next one.
     until(
         lambda: (
-            is_refused("transforms_static rejected: malformed") or is_refused("the position of mesh hand was rejected")
+            is_rejected("transforms_static rejected: malformed")
+            or is_rejected("the position of mesh hand was rejected")
         ),
         "doubt of the transform",
     )
@@ -207,10 +208,10 @@ def test_messages_that_cannot_be_deserialised(start_stream):
     until(is_false, "false after the node was activated again")
     table = peer.publisher(MeshVertices, "meshes/table/vertices")
     table.publish(serialize_message(mesh_messages.vertices_message(TABLE, 2))[:24])
-    until(lambda: is_refused("mesh table rejected: malformed"), "doubt of the table")
+    until(lambda: is_rejected("mesh table rejected: malformed"), "doubt of the table")
     stated = stream.sent
     until(lambda: stream.sent >= stated + 20, "frames of the hand")
-    assert is_refused("mesh table rejected: malformed") and stream.listener.stop
+    assert is_rejected("mesh table rejected: malformed") and stream.listener.stop
 
 
 @pytest.mark.parametrize("lost", [False, True])
@@ -252,15 +253,15 @@ def test_a_publisher_of_static_transforms_that_ends_is_no_loss_and_hides_none(st
         publish(stays, "mount")
     for _ in range(5):
         used("mount")
-    refused = stream.node.frames_status(answered=2 * stream.sent).get("transforms_refused", "0")
-    assert refused == ("1" if lost else "0")
+    rejected = stream.node.frames_status(answered=2 * stream.sent).get("transforms_rejected", "0")
+    assert rejected == ("1" if lost else "0")
     if lost:
 
         def newer_frames_leave_doubt():
             """A frame sent after the message was rejected: the node may have read that late."""
             used("mount")
             _, message, values = stream.node.peer.statuses.get("stop", (b"", "", {}))
-            return values.get("cause") == "refused" and "hand" in message
+            return values.get("cause") == "rejected" and "hand" in message
 
         stream.node.wait_until(newer_frames_leave_doubt, "the doubt is about the mesh")
         assert stream.listener.stop
@@ -271,8 +272,8 @@ SLIDER = """<robot name="arm"><link name="base"/><link name="tip"><collision><ge
 <axis xyz="0 0 1"/><limit lower="-9" upper="9"/></joint></robot>"""
 
 
-def test_a_robot_of_which_something_newer_is_refused_is_unknown(start_stream):
-    """A joint named twice, publishers that contradict each other, descriptions that are refused or make no scene."""
+def test_a_robot_of_which_something_newer_is_rejected_is_unknown(start_stream):
+    """A joint named twice, publishers that contradict each other, descriptions that are rejected or make no scene."""
     stream = start_stream(
         meshes=["table"],
         mesh={"table": {"static": True}},
@@ -322,7 +323,7 @@ def test_a_robot_of_which_something_newer_is_refused_is_unknown(start_stream):
         say()
         say(at=(-1.0,), publisher=other)
         peer.executor.spin_once(timeout_sec=0.02)
-    stream.status("refused", "two publishers on joint_states contradict each other")
+    stream.status("rejected", "two publishers on joint_states contradict each other")
     until(stop_is(True, "contradict each other"))
     peer.node.destroy_publisher(other)
     stamp += 11 * 10**9
@@ -427,7 +428,7 @@ def test_its_last_word_is_true(start_stream, number):
     assert stream.heard[-1][1] and stream.listener.stop
 
 
-def test_nothing_to_watch_is_refused(start_node):
+def test_nothing_to_watch_is_rejected(start_node):
     for given in ({"meshes": ["hand"]}, {"meshes": list(MESHES), "ignored_pairs": ["table:hand"]}, {"meshes": [""]}):
         node = start_node({**given, "stop_distance": 0.1}, wait=False)
         assert node.process.wait(60) == 2 and "stop_distance: no two different meshes" in node.output()

@@ -154,12 +154,12 @@ def test_point_clouds(start_node, layout):
     for k, message in enumerate(node.contacts(2), start=1):
         assert assert_same_contacts(message, frames[k - 1], frames[k], scene_of(cloth=sheet_faces(n))) > 0
         assert message.step == k
-    refused = cloud(frames[0], **layout)
-    refused.header.stamp = fields.ns_to_stamp(100)
-    refused.is_bigendian = True
-    publisher.publish(refused)
+    rejected = cloud(frames[0], **layout)
+    rejected.header.stamp = fields.ns_to_stamp(100)
+    rejected.is_bigendian = True
+    publisher.publish(rejected)
     values = node.frames_status(dropped=1, dropped__cloth__big_endian=1)
-    assert "swap the bytes" in values["last_refusal"]
+    assert "swap the bytes" in values["last_rejection"]
 
 
 def test_topology_and_static_mesh_from_files(start_node, tmp_path):
@@ -308,9 +308,9 @@ def test_messages_beyond_the_rate_are_counted(start_node):
     values = node.wait_until(
         lambda: (v := node.peer.statuses["frames"][2])["received"] == "40" and v, "status with all messages"
     )
-    refused = int(values["dropped.cloth.rate"])
-    assert 0 < refused <= 38, "two at once are within the rate; how many more depends on how long sending took"
-    assert "parameter max_rate" in values["last_refusal"]
+    rejected = int(values["dropped.cloth.rate"])
+    assert 0 < rejected <= 38, "two at once are within the rate; how many more depends on how long sending took"
+    assert "parameter max_rate" in values["last_rejection"]
 
 
 def test_best_effort_input(start_node):

@@ -37,7 +37,7 @@ def test_pose_of_a_stream(start_node):
     check(node.contacts(1)[0], 1)
     node.peer.vertices("net", parts(2)[2], 2 * SECOND, frame_id="foot")
     values = node.frames_status(dropped__net__frame_id=1)
-    assert "mesh.net.frame requires 'hand'" in values["last_refusal"]
+    assert "mesh.net.frame requires 'hand'" in values["last_rejection"]
 
 
 def test_pose_of_integers(start_node):
@@ -47,12 +47,12 @@ def test_pose_of_integers(start_node):
     assert set_parameter(node, "mesh.net.pose", [1, 0, 0, 0, 0, 0, 1]).successful
     assert set_parameter(node, "minimum_separation", 1).successful
     assert set_parameter(node, "minimum_separation", 0).successful
-    refused = set_parameter(node, "minimum_separation", -1)
-    assert not refused.successful and "range" in refused.reason
-    refused = set_parameter(node, "mesh.net.pose", [1, 0, 0, 0, 0, 0, 0])
-    assert not refused.successful and "mesh.net.pose: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]" in refused.reason
-    refused = set_parameter(node, "threads", 1.0)
-    assert not refused.successful and "Wrong parameter type" in refused.reason
+    rejected = set_parameter(node, "minimum_separation", -1)
+    assert not rejected.successful and "range" in rejected.reason
+    rejected = set_parameter(node, "mesh.net.pose", [1, 0, 0, 0, 0, 0, 0])
+    assert not rejected.successful and "mesh.net.pose: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]" in rejected.reason
+    rejected = set_parameter(node, "threads", 1.0)
+    assert not rejected.successful and "Wrong parameter type" in rejected.reason
     assert change_state(node, Transition.TRANSITION_CONFIGURE) and change_state(node, Transition.TRANSITION_ACTIVATE)
     topologies(node)
     for k in range(2):
@@ -87,13 +87,13 @@ def test_transforms_of_geometry_msgs(start_node):
     for k in (4, 5, 6):
         node.peer.vertices("net", parts(k)[2], k * SECOND, frame_id="hand")
     values = node.frames_status(dropped__net__no_transform=1, waiting=2)
-    assert "before the stamp 4000000000 ns" in values["last_refusal"]
+    assert "before the stamp 4000000000 ns" in values["last_rejection"]
     node.wait_until(lambda: "net waits for a transform" in node.peer.statuses["frames"][1], "warning")
     node.peer.vertices("net", parts(7)[2], 7 * SECOND)
     values = node.frames_status(dropped__net__frame_id=1)
-    assert "frame_id is empty" in values["last_refusal"]
+    assert "frame_id is empty" in values["last_rejection"]
     publisher.publish(transform("arm", "hand", Rigid(HAND.quaternion * 2, HAND.shift), 9 * SECOND))
-    node.frames_status(transforms_refused=1)
+    node.frames_status(transforms_rejected=1)
     assert "it must be 1" in node.output()
 
 
@@ -119,7 +119,7 @@ def test_who_waits_for_a_transform_is_told_what_came(start_node):
     told("/transforms 2 messages", "/transforms_static no messages", "; frames known: hand, base, world")
     send(node, 1, "left/hand")
     values = node.frames_status(dropped__net__no_transform=1)
-    assert "/transforms 2 messages" in values["last_refusal"]
+    assert "/transforms 2 messages" in values["last_rejection"]
 
 
 def test_transforms_of_tf2(start_node):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes that come as shape_msgs/Mesh or as markers of triangles: answered, refused, recorded and computed again."""
+"""Meshes that come as shape_msgs/Mesh or as markers of triangles: answered, rejected, recorded and computed again."""
 
 import numpy as np
 from bag_tools import replayed
@@ -56,7 +56,7 @@ def test_a_stream_of_markers(start_node, tmp_path, hpccd):
     node.peer.await_readers("meshes/cloth/marker")
     node.wait_until(lambda: recorder.publishers(f"{node.namespace}/contacts"), "the second recorder to hear")
 
-    # What is refused changes nothing of what is answered.
+    # What is rejected changes nothing of what is answered.
     stop = marker_of(sheet(4), FACES, stamp=5, frame_id="world")
     stop.action = Marker.DELETE
     send(node, "marker", stop)
@@ -64,11 +64,11 @@ def test_a_stream_of_markers(start_node, tmp_path, hpccd):
     cube.type = Marker.CUBE
     send(node, "marker", cube)
     values = node.frames_status(dropped__cloth__unsupported_type=2)
-    assert "marker of type 1; only TRIANGLE_LIST (11) is a mesh" in values["last_refusal"]
+    assert "marker of type 1; only TRIANGLE_LIST (11) is a mesh" in values["last_rejection"]
     topology = node.peer.publisher(MeshTopology, "meshes/cloth/topology", qos.TOPOLOGY)
     topology.publish(mesh_messages.topology_message(FACES, N * N, version=3))
     assert topology.wait_for_all_acked(Duration(seconds=60))
-    node.frames_status(topologies_refused__cloth__topology_conflict=1)
+    node.frames_status(topologies_rejected__cloth__topology_conflict=1)
     for k in (4, 5):
         send(node, "marker", marker_of(sheet(k), FACES, stamp=k + 1, frame_id="world"))
         node.frames_status(answered=k + 1)
@@ -123,7 +123,7 @@ def test_a_stream_of_shapes_within_a_room_of_one(start_node, tmp_path):
     wrong.triangles[3].vertex_indices[1] = N * N
     send(node, "shape", wrong)
     values = node.frames_status(dropped__cloth__index_range=1)
-    assert f"triangle 3 names vertex {N * N}, the mesh has {N * N} vertices" in values["last_refusal"]
+    assert f"triangle 3 names vertex {N * N}, the mesh has {N * N} vertices" in values["last_rejection"]
     assert node.stop() == 0
     replay, _ = replayed(path)
     assert (replay.verified, replay.diverged, replay.unverified) == (3, 0, 0)
@@ -150,7 +150,7 @@ def test_a_marker_in_a_frame_of_its_own(start_node):
     assert_same_contacts(node.contacts(1)[0], *placed, scene_of(cloth=WELDED))
 
 
-def test_a_file_beside_whole_meshes_is_refused(start_node):
+def test_a_file_beside_whole_meshes_is_rejected(start_node):
     node = start_node({"meshes": ["a"], "mesh": {"a": {"input": "shape", "file": "a.obj"}}}, wait=False)
     assert node.process.wait(timeout=60) == 2
     assert "mesh.a.file: with mesh.a.input shape each message carries the triangles" in node.output()

@@ -166,7 +166,7 @@ def test_stamps_of_any_time(start_stream):
         stream.sent = stamp
         stream.frame(hand(2.0))
     stream.expect(False)
-    stream.sent -= 10  # refused, as it goes backward
+    stream.sent -= 10  # rejected, as it goes backward
     stream.frame(2.0)
     stream.expect(True)
-    stream.status("refused", "stamp_backward")
+    stream.status("rejected", "stamp_backward")

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from hpccd_ros.base.clocks import Clocks
-from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Input, Reason, Rejection
 from hpccd_ros.frames.types import ALWAYS, OUTDATED, UNKNOWN_TIME, Origin
 from hpccd_ros.node.stop_doubts import WatchedScene
 from hpccd_ros.node.stop_state import IN_TIME, Cause, StopState
@@ -86,7 +86,7 @@ def test_an_answer_for_a_smaller_distance_does_not_count(state):
 def test_nothing_counts_while_inactive(times):
     state = StopState(0.25, TIMEOUT, clocks=times.clocks)
     state.times = times
-    state.refused(Refusal("hand", Reason.NOT_FINITE))
+    state.rejected(Rejection("hand", Reason.NOT_FINITE))
     assert cause(state) is Cause.INACTIVE
     state.begin(SCENE)
     clear(state)
@@ -117,35 +117,35 @@ def test_what_has_no_age_and_what_tells_none(state):
     clear(state, table=UNKNOWN_TIME)
     assert cause(state) is None, "a file: static meshes have no age"
     clear(state, table=OUTDATED)
-    assert cause(state) is Cause.REFUSED and "newer message about the position of mesh table" in state.why().text
+    assert cause(state) is Cause.REJECTED and "newer message about the position of mesh table" in state.why().text
 
 
 @pytest.mark.parametrize(
-    "refusal, settled_by",
+    "rejection, settled_by",
     [
-        (Refusal("hand", Reason.NOT_FINITE), dict(hand=1)),
-        (Refusal("table", Reason.NOT_FINITE), dict(table=1)),
-        (Refusal("hand", Reason.OUT_OF_RANGE, aspect=Aspect.SHAPE), dict(shape=1)),
-        (Refusal("table", Reason.TOPOLOGY_CONFLICT, what=Input.TOPOLOGY, aspect=Aspect.TOPOLOGY), dict(topology=1)),
-        (Refusal("joint_states", Reason.MALFORMED, what=Input.JOINT_STATE), dict(tip=1)),
-        (Refusal("joint_states", Reason.CONTRADICTED, what=Input.JOINT_STATE), dict(tip=1)),
-        (Refusal("tf", Reason.MALFORMED, what=Input.TRANSFORM), dict(hand=1)),
-        (Refusal("hand", Reason.RATE), dict(hand=1)),
+        (Rejection("hand", Reason.NOT_FINITE), dict(hand=1)),
+        (Rejection("table", Reason.NOT_FINITE), dict(table=1)),
+        (Rejection("hand", Reason.OUT_OF_RANGE, aspect=Aspect.SHAPE), dict(shape=1)),
+        (Rejection("table", Reason.TOPOLOGY_CONFLICT, what=Input.TOPOLOGY, aspect=Aspect.TOPOLOGY), dict(topology=1)),
+        (Rejection("joint_states", Reason.MALFORMED, what=Input.JOINT_STATE), dict(tip=1)),
+        (Rejection("joint_states", Reason.CONTRADICTED, what=Input.JOINT_STATE), dict(tip=1)),
+        (Rejection("tf", Reason.MALFORMED, what=Input.TRANSFORM), dict(hand=1)),
+        (Rejection("hand", Reason.RATE), dict(hand=1)),
     ],
 )
-def test_a_mesh_is_unknown_until_something_valid_of_it_comes(state, refusal, settled_by):
+def test_a_mesh_is_unknown_until_something_valid_of_it_comes(state, rejection, settled_by):
     """Frames of other meshes, and of other aspects of it, do not settle it."""
     before = state.times.now
     fixed = dict(hand=before, table=before, tip=before, shape=before, topology=before)
     clear(state, **fixed)
     assert cause(state) is None
     state.times.pass_by(1)
-    state.refused(refusal)
+    state.rejected(rejection)
     state.times.pass_by(1)
-    assert cause(state) is Cause.REFUSED
+    assert cause(state) is Cause.REJECTED
     (name,) = settled_by
     clear(state, **dict.fromkeys(fixed, state.times.now) | {name: before})
-    assert cause(state) is Cause.REFUSED
+    assert cause(state) is Cause.REJECTED
     clear(state, **fixed | {name: state.times.now})
     assert cause(state) is None
 
@@ -156,30 +156,30 @@ def test_what_was_rejected_is_older_than_what_is_in_use(state):
     state.times.pass_by(1)
     sent = state.times.now
     state.times.pass_by(1)
-    state.refused(Refusal("hand", Reason.NOT_FINITE, sent=sent))
+    state.rejected(Rejection("hand", Reason.NOT_FINITE, sent=sent))
     clear(state, hand=sent)
-    assert cause(state) is Cause.REFUSED
+    assert cause(state) is Cause.REJECTED
     clear(state, hand=sent + 1)
     assert cause(state) is None
     for given in (
-        Refusal("hand", Reason.OVERLOAD),
-        Refusal("hand", Reason.INCOMPLETE),
-        Refusal("other", Reason.NOT_FINITE),
-        Refusal("tf", Reason.MALFORMED, what=Input.TRANSFORM, aspect=Aspect.NOTHING),
-        Refusal("other_states", Reason.MALFORMED, what=Input.JOINT_STATE),
+        Rejection("hand", Reason.OVERLOAD),
+        Rejection("hand", Reason.INCOMPLETE),
+        Rejection("other", Reason.NOT_FINITE),
+        Rejection("tf", Reason.MALFORMED, what=Input.TRANSFORM, aspect=Aspect.NOTHING),
+        Rejection("other_states", Reason.MALFORMED, what=Input.JOINT_STATE),
     ):
-        state.refused(given)
+        state.rejected(given)
         assert cause(state) is None, "it gave way, or concerns nothing in the scene"
 
 
 def test_doubts_outlive_a_scene_that_is_made_anew(state):
-    state.refused(Refusal("table", Reason.NOT_FINITE))
-    state.refused(Refusal("arm/tip", Reason.OUT_OF_RANGE))
+    state.rejected(Rejection("table", Reason.NOT_FINITE))
+    state.rejected(Rejection("arm/tip", Reason.OUT_OF_RANGE))
     state.end()
     state.begin(WatchedScene(("hand", "table"), (True, False)))
     now = state.times.now
     state.answered(None, 0.25, [Origin(now), Origin(1)])
-    assert cause(state) is Cause.REFUSED and "table" in state.why().text
+    assert cause(state) is Cause.REJECTED and "table" in state.why().text
     state.answered(None, 0.25, [Origin(now), Origin(now + 1)])
     assert cause(state) is None, "the link is no more in the scene"
 
@@ -190,14 +190,14 @@ def test_doubts_of_what_moves_a_robot_outlive_other_links(state, links):
     robot = ("arm/base", "arm/tip")
     state.begin(WatchedScene(("hand", *robot), (True,) * 3, {"joint_states": robot}))
     sent = state.times.now
-    state.refused(Refusal("joint_states", Reason.NOT_FINITE, what=Input.JOINT_STATE, sent=sent))
+    state.rejected(Rejection("joint_states", Reason.NOT_FINITE, what=Input.JOINT_STATE, sent=sent))
     state.times.pass_by(1)
     for scene in ((), links):
         state.begin(WatchedScene(("hand", *scene), (True,) * (1 + len(scene)), {"joint_states": scene}))
         for _ in range(2):
             state.answered(None, 0.25, [Origin(state.times.now), *[Origin(sent)] * len(scene)])
             state.next(0.0)
-        assert cause(state) is (Cause.REFUSED if scene else None)
+        assert cause(state) is (Cause.REJECTED if scene else None)
     if links:
         state.answered(None, 0.25, [Origin(state.times.now)] * (1 + len(links)))
         assert cause(state) is None
@@ -210,18 +210,18 @@ def test_what_came_before_settles_nothing(state):
     assert cause(state) is None
     state.times.pass_by(1)
     for unknown in (None, UNKNOWN_TIME):
-        state.refused(Refusal("table", Reason.MALFORMED, sent=unknown))
+        state.rejected(Rejection("table", Reason.MALFORMED, sent=unknown))
         clear(state, table=before)
-        assert cause(state) is Cause.REFUSED
+        assert cause(state) is Cause.REJECTED
         clear(state, table=state.times.now + 1)
         assert cause(state) is None
         state.times.pass_by(1)
     ahead = state.times.now + 5 * SECOND
     state.received("positions", "table", dict(source_timestamp=ahead, received_timestamp=0))
-    state.refused(Refusal("table", Reason.NOT_FINITE, sent=state.times.now))
+    state.rejected(Rejection("table", Reason.NOT_FINITE, sent=state.times.now))
     for _ in range(30):
         clear(state, table=ahead)
-        assert cause(state) in (Cause.REFUSED, Cause.CLOCKS)
+        assert cause(state) in (Cause.REJECTED, Cause.CLOCKS)
         state.times.pass_by(TIMEOUT / 10)
     clear(state, table=state.times.now)
     assert cause(state) is None
@@ -230,7 +230,7 @@ def test_what_came_before_settles_nothing(state):
 def test_a_failure_is_settled_by_later_messages(state):
     clear(state)
     state.times.pass_by(1)
-    state.refused(Refusal("hand", Reason.DETECTION_FAILED))
+    state.rejected(Rejection("hand", Reason.DETECTION_FAILED))
     clear(state, hand=state.times.now - 1)
     assert cause(state) is Cause.FAILED
     state.times.pass_by(1)
@@ -243,7 +243,7 @@ def test_robots_whose_description_is_not_in_use(state):
     assert cause(state) is None
     state.robots({"arm": "its description was rejected: no root"})
     clear(state)
-    assert cause(state) is Cause.REFUSED and "robot arm: its description was rejected" in state.why().text
+    assert cause(state) is Cause.REJECTED and "robot arm: its description was rejected" in state.why().text
     state.robots({})
     assert cause(state) is None
 
@@ -284,8 +284,8 @@ def test_what_was_sent_before_a_clock_was_set_back_never_seems_young(state):
 def test_doubts_and_a_clock_that_is_set_back(state, jump):
     """Inputs without an age are in doubt until sent again once the clock has caught up; frames settle theirs before."""
     clear(state, table=state.times.now)
-    state.refused(Refusal("table", Reason.NOT_FINITE))
-    state.refused(Refusal("hand", Reason.NOT_FINITE))
+    state.rejected(Rejection("table", Reason.NOT_FINITE))
+    state.rejected(Rejection("hand", Reason.NOT_FINITE))
     placed = state.times.now
     state.times.now -= jump * SECOND
     for _ in range(21):
@@ -293,17 +293,17 @@ def test_doubts_and_a_clock_that_is_set_back(state, jump):
         assert state.next(0.0) is not None
         state.times.pass_by(TIMEOUT / 10)
     clear(state, table=placed)
-    assert cause(state) is Cause.REFUSED and "table" in state.why().text, "and not the hand"
+    assert cause(state) is Cause.REJECTED and "table" in state.why().text, "and not the hand"
     while state.times.now <= placed:
         state.times.pass_by(TIMEOUT / 2)
         clear(state, table=placed)
-        assert cause(state) is Cause.REFUSED
+        assert cause(state) is Cause.REJECTED
     clear(state, table=state.times.now)
     assert cause(state) is None
-    state.refused(Refusal("table", Reason.NOT_FINITE, sent=1))
+    state.rejected(Rejection("table", Reason.NOT_FINITE, sent=1))
     clear(state, table=state.times.now)
     state.next(0.0)
-    assert cause(state) is Cause.REFUSED, "newer than what is in use, whatever its time"
+    assert cause(state) is Cause.REJECTED, "newer than what is in use, whatever its time"
 
 
 def test_the_last_message_before_a_clock_was_set_back_grows_old(state):
@@ -369,12 +369,12 @@ def test_each_rise_is_said_however_short(state):
     clear(state)
     assert state.next(later).cause is Cause.NEAR
     assert state.next(later) is None
-    state.refused(Refusal("hand", Reason.NOT_FINITE))
+    state.rejected(Rejection("hand", Reason.NOT_FINITE))
     state.times.pass_by(1)
     clear(state)
-    assert state.next(later).cause is Cause.REFUSED
+    assert state.next(later).cause is Cause.REJECTED
     assert state.next(later) is None
-    assert state.rises == {Cause.UNANSWERED: 1, Cause.NEAR: 1, Cause.REFUSED: 1}
+    assert state.rises == {Cause.UNANSWERED: 1, Cause.NEAR: 1, Cause.REJECTED: 1}
 
 
 def test_it_wakes_by_itself_when_the_time_is_over():

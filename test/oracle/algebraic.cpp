@@ -91,7 +91,7 @@ double floor_to_double(const Integer& n, unsigned k) {
 }  // namespace
 
 // Quadratic interval refinement (Abbott 2006): a secant guesses the subinterval, exact signs at its two ends
-// accept or refuse it. A right guess doubles the bits gained next time, a wrong one halves them; one bit is
+// accept or reject it. A right guess doubles the bits gained next time, a wrong one halves them; one bit is
 // bisection.
 void Root::refine() {
   const Integer low = scaled_value(p_, n_, k_), high = scaled_value(p_, n_ + 1, k_);

@@ -114,10 +114,10 @@ def project(folder: Path, text: str) -> Path:
     return folder
 
 
-def refused(tmp_path: Path, text: str, where: Path, says: str) -> None:
+def rejected(tmp_path: Path, text: str, where: Path, says: str) -> None:
     """A project that cannot be configured with what was installed, or built, at `where`."""
     with pytest.raises(AssertionError, match=says):
-        configure(project(tmp_path / "refused", text), tmp_path / "build_of_refused", where)
+        configure(project(tmp_path / "rejected", text), tmp_path / "build_of_rejected", where)
 
 
 def test_versions_that_fit(prefix, tmp_path):
@@ -125,12 +125,12 @@ def test_versions_that_fit(prefix, tmp_path):
     fits = project(tmp_path / "fits", f"find_package(hpccd_core {major}.{minor} REQUIRED)")
     configure(fits, tmp_path / "a", prefix)
     later = f"find_package(hpccd_core {major}.{minor + 1} REQUIRED)"
-    refused(tmp_path, later, prefix, says="requested\\s+version")
+    rejected(tmp_path, later, prefix, says="requested\\s+version")
 
 
 def test_a_component_that_is_not_there(prefix, tmp_path):
     wrong = "find_package(hpccd_core REQUIRED COMPONENTS gpu)"
-    refused(tmp_path, wrong, prefix, says="components static and shared, not\\s+'gpu'")
+    rejected(tmp_path, wrong, prefix, says="components static and shared, not\\s+'gpu'")
 
 
 def test_an_optional_component_that_is_not_there(prefix, tmp_path):
@@ -145,7 +145,7 @@ def test_an_optional_component_that_is_not_there(prefix, tmp_path):
 @pytest.mark.usefixtures("prefix")  # the library is built
 def test_what_is_only_built_is_no_package(tmp_path):
     user = "find_package(hpccd_core REQUIRED)"
-    refused(tmp_path, user, BUILD, says="Could not find a package configuration file")
+    rejected(tmp_path, user, BUILD, says="Could not find a package configuration file")
 
 
 def test_a_program_that_links_both(prefix, tmp_path):

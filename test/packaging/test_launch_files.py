@@ -10,7 +10,7 @@ from sources import ROOT
 from hpccd_ros.params.table import NODE_ROWS
 
 FILES = sorted((ROOT / "launch").glob("*.launch.xml"))
-# What launch takes (launch_ros/actions/node.py and launch/actions of Jazzy) and is used here; unknown ones it refuses.
+# What launch takes (launch_ros/actions/node.py and launch/actions of Jazzy) and is used here; unknown ones it rejects.
 ATTRIBUTES = {
     "launch": set(),
     "arg": {"name", "default", "description"},

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The check before a release: refuses what is not settled, on copies of the files that it reads, and nothing else."""
+"""The check before a release: rejects what is not settled, on copies of the files that it reads, and nothing else."""
 
 import re
 import runpy
@@ -85,14 +85,14 @@ def test_what_is_settled_passes(checkout):
         ("hpccd_core/include/hpccd/version.h", 'VERSION ".+"', 'VERSION "9.9.9"', r"versions differ: .*version\.h has"),
     ],
 )
-def test_what_is_not_settled_is_refused(checkout, name, pattern, text, told):
+def test_what_is_not_settled_is_rejected(checkout, name, pattern, text, told):
     settle(checkout)
     change(checkout, name, pattern, text)
     status, lines = check(checkout)
     assert status == 1 and any(re.match(told, line) for line in lines), lines
 
 
-def test_another_folder_is_refused(tmp_path):
+def test_another_folder_is_rejected(tmp_path):
     status, lines = check(tmp_path)
     assert status == 1 and len(lines) == 1 and "cannot be read as a checkout of hpccd (FileNotFoundError" in lines[0]
 

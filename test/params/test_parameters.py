@@ -151,7 +151,7 @@ def test_changes_at_run_time(node_with):
     assert change("max_contacts", 5).successful and settings["max_contacts"] == 5
     assert change("outputs", ["normals"]).successful and settings["outputs"] == ["normals"]
     assert change("outputs", [""]).successful and settings["outputs"] == []
-    refusals = {
+    rejections = {
         "accuracy": ("fast", "fast is not built"),
         "report": ("some", "report: 'some' is not valid; use one of"),
         "frame_queue": (4, "frame_queue: read-only while the node is configured; deactivate and clean up first"),
@@ -160,7 +160,7 @@ def test_changes_at_run_time(node_with):
         "threads": (-4, "range"),
         "record_split_size": (1e-6, "use 0, or at least"),
     }
-    for name, (value, reason) in refusals.items():
+    for name, (value, reason) in rejections.items():
         result = change(name, value)
         assert not result.successful and reason in result.reason
     assert len(changes) == 3

@@ -35,8 +35,8 @@ def test_whatever_a_recording_holds_it_ends_with_a_status_and_a_sentence(family,
     assert len(seen) == number
     # Both must be reached, or nothing was tried.
     verified = [result["name"] for result in seen if result["outcomes"]["replay"] == "VERIFIED"]
-    refused = [result["name"] for result in seen if result["outcomes"]["replay"] == 2]
-    assert len(refused) > number / 4 and (verified or family == "random")
+    rejected = [result["name"] for result in seen if result["outcomes"]["replay"] == 2]
+    assert len(rejected) > number / 4 and (verified or family == "random")
 
 
 def test_a_sample_as_processes(sound_bags, tmp_path, hpccd):

@@ -165,7 +165,7 @@ def test_any_contact_must_be_one_that_there_is(answered, change, says):
     _diverges(answered(change, report="any"), says)
 
 
-def test_coordinates_that_the_core_refuses(sound_bags, tmp_path):
+def test_coordinates_that_the_core_rejects(sound_bags, tmp_path):
     bag = Bag.read(sound_bags / "everything.mcap")
 
     def change(put, message):
@@ -174,7 +174,7 @@ def test_coordinates_that_the_core_refuses(sound_bags, tmp_path):
     decoded(bag, "/meshes/cloth/vertices", _First(), change, all_of_them=True)
     path = bag.write(tmp_path / "x.mcap")
     done = hpccd("replay", path)
-    # Refused as the node refuses them, before the core sees them.
+    # Rejected as the node rejects them, before the core sees them.
     assert done.status == 1 and "NOTHING VERIFIED" in done.out and "out_of_range" in done.out, done
     assert hpccd("view", path, "-o", tmp_path / "x.png").status == 2
 

@@ -32,7 +32,7 @@ def ros_node():
 
 def of_replay(recording, setup):
     source = FrameSource(setup, recording.topics)
-    return [frame for message in recording.messages(source.topics) for frame in source.push(message)], source.refused
+    return [frame for message in recording.messages(source.topics) for frame in source.push(message)], source.rejected
 
 
 def of_node(node, recording, setup):
@@ -53,11 +53,11 @@ def of_node(node, recording, setup):
         topic.receive(make_decoder(recording.topics[message.topic])(message), info)
     for subscriptions in streams.values():
         subscriptions.close()
-    return queue.frames(), {Input.VERTICES: accounts.dropped, Input.TOPOLOGY: accounts.topologies_refused}
+    return queue.frames(), {Input.VERTICES: accounts.dropped, Input.TOPOLOGY: accounts.topologies_rejected}
 
 
 def spoil(index, message, decoded):
-    """Now and then what is refused: stamps that are no time or go back, positions that are no numbers or too few."""
+    """Now and then what is rejected: stamps that are no time or go back, positions that are no numbers or too few."""
     if message.topic.endswith("/vertices"):
         index += 3 * message.topic.startswith("/meshes/ball")  # not the same frames of both meshes
         if index % 20 == 7:
@@ -72,20 +72,20 @@ def spoil(index, message, decoded):
 
 
 @pytest.mark.parametrize("spoilt", [False, True])
-def test_the_same_frames_and_refusals(ros_node, small_bag, tmp_path, spoilt):
+def test_the_same_frames_and_rejections(ros_node, small_bag, tmp_path, spoilt):
     if spoilt:
         rewrite(small_bag, tmp_path / "spoilt.mcap", spoil)
     with Recording(tmp_path / "spoilt.mcap" if spoilt else small_bag) as recording:
         setup = recorded_setup.of_recording(recording)
-        node_frames, node_refused = of_node(ros_node, recording, setup)
-        replay_frames, replay_refused = of_replay(recording, setup)
+        node_frames, node_rejected = of_node(ros_node, recording, setup)
+        replay_frames, replay_rejected = of_replay(recording, setup)
     assert len(node_frames) == len(replay_frames) and 40 < len(node_frames) <= 90
     for a, b in zip(node_frames, replay_frames, strict=True):
         assert (a.stamp, a.step, a.frame_id, a.fresh) == (b.stamp, b.step, b.frame_id, b.fresh)
         assert [t.version for t in a.topologies] == [t.version for t in b.topologies]
         assert all(np.array_equal(x, y) and x.dtype == y.dtype for x, y in zip(a.vertices, b.vertices, strict=True))
-    for what, counter in node_refused.items():
-        assert counter.by_mesh_and_reason() == replay_refused[what].by_mesh_and_reason()
-    reasons = set(node_refused[Input.VERTICES].by_reason())
+    for what, counter in node_rejected.items():
+        assert counter.by_mesh_and_reason() == replay_rejected[what].by_mesh_and_reason()
+    reasons = set(node_rejected[Input.VERTICES].by_reason())
     of_spoilt = {"malformed", "not_finite", "wrong_vertex_count", "stamp_backward", "incomplete"}
     assert reasons == (of_spoilt if spoilt else set())

@@ -83,7 +83,7 @@ def test_numbers_and_unknown_names_are_taken_as_the_node_takes_them(foreign, tmp
     assert done.err == "parameter tresholds is unknown and has no effect; docs/parameters.md lists all\n"
 
 
-def test_a_misspelt_name_in_the_file_is_refused_as_the_node_refuses_it(foreign, tmp_path):
+def test_a_misspelt_name_in_the_file_is_rejected_as_the_node_rejects_it(foreign, tmp_path):
     path = tmp_path / "node.yaml"
     path.write_text(NODE + "    minimum_seperation: 0.1\n")
     done = hpccd("replay", foreign, "--params", path)

@@ -27,7 +27,7 @@ def _replay(path, **options):
 
 
 def _dropped(replay):
-    return replay.source.refused[Input.VERTICES].by_mesh_and_reason()
+    return replay.source.rejected[Input.VERTICES].by_mesh_and_reason()
 
 
 def _changed_answer(source, target, change, answer=ANSWER):
@@ -63,7 +63,7 @@ def test_answers_hold_the_versions_of_their_topologies(small_bag):
 
 
 @pytest.mark.parametrize("with_hash", [True, False], ids=["hash", "text only"])
-def test_another_definition_is_refused(small_bag, with_hash):
+def test_another_definition_is_rejected(small_bag, with_hash):
     """A field less, or of another type: the bytes would be misread. A comment more changes nothing."""
     with Recording(small_bag) as recording:
         topic = recording.topics["/contacts"]

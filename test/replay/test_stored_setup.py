@@ -25,7 +25,7 @@ def changed(sound_bags, tmp_path):
     return write
 
 
-def _refused(path, *says):
+def _rejected(path, *says):
     """By replay and view, in one line that holds all of `says`."""
     for command in (("replay", path), ("view", path, "-o", path.with_suffix(".png"))):
         done = hpccd(*command)
@@ -72,14 +72,14 @@ def test_a_stored_parameter_that_no_node_could_have(changed, name, value, says):
     if says is None:  # not set, or of no consequence
         assert hpccd("replay", path).status in (0, 1)
     else:
-        _refused(path, "the stored parameters: ", says)
+        _rejected(path, "the stored parameters: ", says)
 
 
 def test_a_scene_that_cannot_move(changed):
     def change(info):
         info["parameters"] |= {"mesh.cloth.static": True, "mesh.ball.static": True}
 
-    _refused(changed(change), "at least one mesh must not be static")
+    _rejected(changed(change), "at least one mesh must not be static")
 
 
 def test_a_parameter_of_another_version_is_told_of(changed):
@@ -92,18 +92,18 @@ def test_a_parameter_of_another_version_is_told_of(changed):
 
 @pytest.mark.parametrize("text", ["", "{", "[" * 100_000, '{"a":' * 5_000, "9" * 5000, "nan ", "\0"])
 def test_a_setup_that_is_no_json(changed, text):
-    _refused(changed(text=text), "stored about the node")
+    _rejected(changed(text=text), "stored about the node")
 
 
 @pytest.mark.parametrize("setup", [[], [1], "x", 7, None, True])
 def test_a_setup_that_is_no_object(changed, setup):
-    _refused(changed(text=json.dumps(setup)), "stored about the node is not an object but a")
+    _rejected(changed(text=json.dumps(setup)), "stored about the node is not an object but a")
 
 
 @pytest.mark.parametrize("value", [[1], "x", 7, True])
 @pytest.mark.parametrize("name", ["parameters", "topics"])
 def test_parameters_and_topics_that_are_no_names_with_values(changed, name, value):
-    _refused(changed(lambda info: info.update({name: value})), "no names")
+    _rejected(changed(lambda info: info.update({name: value})), "no names")
 
 
 def test_roles_are_checked_against_types(changed):
@@ -111,7 +111,7 @@ def test_roles_are_checked_against_types(changed):
         topics = info["topics"]
         topics["/contacts"], topics["/meshes/ball/vertices"] = topics["/meshes/ball/vertices"], topics["/contacts"]
 
-    _refused(changed(swap), "is stored as the node's", "hpccd/msg/")
+    _rejected(changed(swap), "is stored as the node's", "hpccd/msg/")
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_a_role_of_two_topics(changed):
     def change(info):
         info["topics"]["/meshes/ball/vertices"] = "meshes/cloth/vertices"
 
-    _refused(changed(change), "are both stored as meshes/cloth/vertices")
+    _rejected(changed(change), "are both stored as meshes/cloth/vertices")
 
 
 @pytest.mark.parametrize(
@@ -151,7 +151,7 @@ def test_names_of_types_are_looked_at_before_they_are_used(changed, name):
         for schema in bag.schemas:
             schema.name = name if schema.name == "hpccd/msg/ContactArray" else schema.name
 
-    _refused(changed(edit=edit), "/contacts")
+    _rejected(changed(edit=edit), "/contacts")
     played = hpccd("replay", changed(edit=edit), "--publish", "--all", "--subscribers", "0", "--wait", "0")
     assert played.status == 2 and "/contacts cannot be played" in played.err, played
 
@@ -209,7 +209,7 @@ def test_topics_that_cannot_be_played(changed, topic):
 )
 def test_names_of_mesh_files(changed, file, says):
     path = changed(lambda info: info["parameters"].update({"mesh.floor.file": file}), base="everything")
-    _refused(path, says)
+    _rejected(path, says)
 
 
 @pytest.mark.parametrize(
@@ -226,4 +226,4 @@ def test_contents_of_mesh_files(changed, data):
     def edit(bag):
         bag.attachments[0].data = data
 
-    _refused(changed(base="everything", edit=edit))
+    _rejected(changed(base="everything", edit=edit))

@@ -149,11 +149,11 @@ def test_threads_may_share_a_step():
         (lambda: placed(np.zeros((1, 7)), [(0, 4)], np.eye(3)), "out of order"),
     ],
 )
-def test_what_the_core_refuses(make, text):
+def test_what_the_core_rejects(make, text):
     with pytest.raises(InvalidArgument, match=text):
         make()
 
 
-def test_bounds_of_no_chain_are_refused():
+def test_bounds_of_no_chain_are_rejected():
     with pytest.raises(TypeError, match="incompatible"):
         JointBounds(None, np.zeros(0), np.zeros(0), IDENTITY.quaternion, IDENTITY.shift)

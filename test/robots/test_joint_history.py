@@ -54,9 +54,9 @@ def test_what_is_not_known_is_named_and_whether_it_may_come():
     ]:
         if stamp == 50:
             joints.add(200, ["turn", "slide"], [0.0, 0.0])
-        with pytest.raises(NoJointStateError, match=message) as refused:
+        with pytest.raises(NoJointStateError, match=message) as rejected:
             joints.at(stamp)
-        assert refused.value.final is final
+        assert rejected.value.final is final
 
 
 def test_a_publisher_that_gives_no_stamps_is_told_of():
@@ -137,9 +137,9 @@ def test_what_is_kept_is_bounded():
     joints = history()
     for k in range(3 * MOST_SAMPLES):
         joints.add(k, ["slide", "turn"], [k, 0.0])
-    with pytest.raises(NoJointStateError, match=f"of {2 * MOST_SAMPLES} ns") as refused:
+    with pytest.raises(NoJointStateError, match=f"of {2 * MOST_SAMPLES} ns") as rejected:
         joints.at(0)
-    assert refused.value.final
+    assert rejected.value.final
     for stamp in (2 * HISTORY_NS, 2 * HISTORY_NS + 1):
         joints.add(stamp, ["slide", "turn"], [0.0, 0.0])
     with pytest.raises(NoJointStateError):
@@ -199,9 +199,9 @@ def test_a_stamp_far_ahead_loses_nothing_of_what_comes_before_and_after():
     assert joints.add(FAR, ["slide", "turn"], [9.0, 9.0]).stray is None
     assert joints.at(FAR) == {"slide": 9.0, "turn": 9.0}
     assert of_now(joints, 485) is False
-    with pytest.raises(NoJointStateError, match=f"is of {FAR} ns, far ahead of the stamp 495000000 ns") as refused:
+    with pytest.raises(NoJointStateError, match=f"is of {FAR} ns, far ahead of the stamp 495000000 ns") as rejected:
         joints.at(495 * MS)
-    assert not refused.value.final
+    assert not rejected.value.final
     assert joints.add(500 * MS, ["turn"], [0.0]).stray == FAR  # of all joints that it told of
     assert joints.add(510 * MS, ["slide", "turn"], [0.0, 0.0]).stray is None
     assert joints.at(495 * MS) == {"slide": 0.0, "turn": 0.0} and joints.latest() == 510 * MS
@@ -216,6 +216,6 @@ def test_what_goes_on_from_a_stamp_far_ahead_confirms_it():
     for stamp in (FAR, FAR + 10 * MS):
         assert joints.add(stamp, ["slide", "turn"], [1.0, 1.0]).stray is None
     assert of_now(joints, FAR // MS + 5) is True
-    with pytest.raises(NoJointStateError) as refused:
+    with pytest.raises(NoJointStateError) as rejected:
         joints.at(495 * MS)
-    assert refused.value.final
+    assert rejected.value.final

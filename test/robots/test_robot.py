@@ -106,7 +106,7 @@ def test_vertices_placed_together_are_those_of_each_pose(base):
         assert placement.moved(IDENTITY).vertices.tobytes() == placement.vertices.tobytes()
 
 
-def test_places_that_the_core_cannot_take_are_refused():
+def test_places_that_the_core_cannot_take_are_rejected():
     for offset in ("1e200", "1e147"):
         with pytest.raises(RobotError, match="fully stretched, the robot would reach 1.4"):
             Robot.of(URDF.replace('xyz="0 0 1"/></joint></robot>', f'xyz="{offset} {offset} 0"/></joint></robot>'))
@@ -131,7 +131,7 @@ def test_the_finer_the_tolerance_the_more_triangles():
         ({"tolerance": 0.0}, "link 'bob': tolerance 0: must be above 0"),
     ],
 )
-def test_what_cannot_be_used_is_refused(arguments, message):
+def test_what_cannot_be_used_is_rejected(arguments, message):
     with pytest.raises(RobotError, match=message):
         Robot.of(**({"urdf_text": URDF} | arguments))
 

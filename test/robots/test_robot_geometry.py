@@ -91,7 +91,7 @@ def test_what_is_wrong_with_a_file_names_the_link(uri, resolver, message):
         made(link((f'<mesh filename="{uri}"/>', "")), resolver)
 
 
-def test_coordinates_that_the_core_refuses_name_the_link():
+def test_coordinates_that_the_core_rejects_name_the_link():
     with pytest.raises(RobotError, match="link 'a': vertex 0 is"):
         made(link(('<box size="1 1 1"/>', '<origin xyz="1e300 0 0"/>')))
 

@@ -87,7 +87,7 @@ def test_what_an_srdf_disables_is_added_and_what_it_enables_is_put_back():
         ("<", "SRDF: is not XML"),
     ],
 )
-def test_entries_without_a_name_are_refused(inside, message):
+def test_entries_without_a_name_are_rejected(inside, message):
     with pytest.raises(RobotError, match=message):
         semantics(inside)
 
@@ -111,7 +111,7 @@ def test_entries_that_name_unknown_links_and_joints_are_ignored_with_a_warning()
     assert "and 4990 more" in many.ignored and len(many.ignored) < 1000
 
 
-def test_hostile_xml_is_refused_here_too():
+def test_hostile_xml_is_rejected_here_too():
     with pytest.raises(RobotError, match="SRDF, line 1: has a document type"):
         srdf.parse("<!DOCTYPE r []><robot/>", "ab")
     with pytest.raises(RobotError, match="<srdf> is the outermost element"):

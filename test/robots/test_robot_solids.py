@@ -134,7 +134,7 @@ def test_a_smaller_tolerance_takes_more_triangles():
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan"), 1e-9])
-def test_tolerances_that_cannot_be_kept_are_refused(tolerance):
+def test_tolerances_that_cannot_be_kept_are_rejected(tolerance):
     with pytest.raises(RobotError, match="tolerance"):
         solids.triangles(Cylinder(1.0, 1.0), tolerance)
 

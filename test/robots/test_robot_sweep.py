@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Some hundred damaged and odd URDFs, SRDFs and parameters of robots, at random: each makes a robot that the core
-accepts, or is refused with RobotError or ParameterError. Nothing else is raised."""
+accepts, or is rejected with RobotError or ParameterError. Nothing else is raised."""
 
 import random
 import re
@@ -142,12 +142,12 @@ def used(rng, folder, number):
 
 @pytest.mark.parametrize("block", range(4))
 def test_nothing_but_errors_of_robots_and_parameters_is_raised(tmp_path, block):
-    taken, refused = 0, set()
+    taken, rejected = 0, set()
     for number in range(100 * block, 100 * (block + 1)):
         try:
             used(random.Random(number), tmp_path, number)
             taken += 1
         except (RobotError, ParameterError) as error:
             assert "\n" not in str(error) and len(str(error)) < 2000, number
-            refused.add(re.sub(r"[0-9'].*", "", str(error)))
-    assert taken >= 15 and len(refused) >= 10, (taken, sorted(refused))
+            rejected.add(re.sub(r"[0-9'].*", "", str(error)))
+    assert taken >= 15 and len(rejected) >= 10, (taken, sorted(rejected))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is read of a URDF, and what is refused: by line and name, with the remedy."""
+"""What is read of a URDF, and what is rejected: by line and name, with the remedy."""
 
 import math
 
@@ -139,7 +139,7 @@ def test_what_others_put_beside_links_is_left_alone():
         ('<robot xmlns:xacro="x">\n<xacro:include filename="a"/></robot>', "line 2: .* is of xacro; expand it first"),
     ],
 )
-def test_what_cannot_be_used_is_refused_by_name(text, message):
+def test_what_cannot_be_used_is_rejected_by_name(text, message):
     with pytest.raises(RobotError, match=message):
         urdf.parse(text)
 
@@ -165,10 +165,10 @@ BOMB = """<?xml version="1.0"?>
     ],
     ids=["bomb", "network", "file", "undefined", "deep", "many", "long", "surrogate", "zero", "twice"],
 )
-def test_hostile_xml_is_refused(text, message):
-    with pytest.raises(RobotError, match=message) as refused:
+def test_hostile_xml_is_rejected(text, message):
+    with pytest.raises(RobotError, match=message) as rejected:
         urdf.parse(text)
-    assert len(str(refused.value)) < 1000
+    assert len(str(rejected.value)) < 1000
 
 
 def of_file(tmp_path, data):

@@ -64,7 +64,7 @@ def bad_index(r):
     r.topologies[0].faces[0] = N * N
 
 
-# Each with a part of the reason for which it is refused.
+# Each with a part of the reason for which it is rejected.
 BAD = [
     (request(names=("ghost",), topologies=False), "unknown mesh 'ghost'"),
     (request(names=("a", "a")), "names must differ"),

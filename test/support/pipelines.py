@@ -13,4 +13,4 @@ def retried(pipeline):
 
 
 def reasons(outcome):
-    return [(refusal.mesh, str(refusal.reason)) for refusal in outcome.refusals]
+    return [(rejection.mesh, str(rejection.reason)) for rejection in outcome.rejections]

@@ -71,7 +71,7 @@ class Oracle:
             stamp = None if static else _ns(message.header.stamp)
             self.transforms.add(message.header.frame_id, message.child_frame_id, rigid, stamp)
         except ValueError:
-            pass  # refused by the node too
+            pass  # rejected by the node too
 
     def _positions(self, mesh, stamp):
         """All candidate states: [(faces, n_vertices, positions)]."""

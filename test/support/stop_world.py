@@ -17,7 +17,7 @@ from stop_promise import Promise
 from hpccd_ros import client
 from hpccd_ros.base.clocks import Clocks
 from hpccd_ros.detect.nearness import Nearness
-from hpccd_ros.frames.drops import Reason, Refusal
+from hpccd_ros.frames.drops import Reason, Rejection
 from hpccd_ros.middleware import fields, mesh_messages
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.configuration import Configuration
@@ -85,7 +85,7 @@ class World:
         self.state = StopState(DISTANCE, TIMEOUT, clock_error=ERROR, clocks=clocks)
         self.state.next(0.0)
         self.accounts = Accounts(lambda text: None)
-        self.accounts.on_refused = self.state.refused
+        self.accounts.on_rejected = self.state.rejected
         self.accounts.on_received = lambda kind, name, info: self.state.received(f"{kind} of {name}", name, info)
         self.subscriptions = Subscriptions(node, self.settings, self.meshes)
         self.node, self.clocks = node, clocks
@@ -309,7 +309,7 @@ class World:
     def revive(self):
         self.alive = dict.fromkeys(self.alive, True)
 
-    def refuse(self):
+    def reject(self):
         self.rng.choice(
             [
                 lambda: self.table(bad=True),
@@ -390,7 +390,7 @@ class World:
         self.accounts.add(self.pipeline.stop())
 
     def fail(self):
-        self.state.refused(Refusal("hand", Reason.DETECTION_FAILED))
+        self.state.rejected(Rejection("hand", Reason.DETECTION_FAILED))
 
     def any(self, names):
         return self.rng.choice(list(names))
@@ -404,7 +404,7 @@ class World:
         "late_listener": 0.5,
         "die": 0.7,
         "revive": 4,
-        "refuse": 1.5,
+        "reject": 1.5,
         "refine": 0.5,
         "resend": 6,
         "move_table": 1,
