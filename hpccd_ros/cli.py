@@ -11,12 +11,14 @@ import signal
 import sys
 
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.version import package_version
 
 COMMANDS = {
     "demo": "see it work: node, moving scene and recorder as separate processes, then a picture",
     "status": "show the state of a running node: rates, what was rejected, what is wrong",
     "echo": "print the messages of a topic",
     "param": "read and set the parameters of a running node",
+    "lifecycle": "read and change the life-cycle state of a running node",
     "record": "record the meshes and contacts of a running node into an MCAP file",
     "replay": "compute a recording again and verify its contacts, or play it over DDS",
     "view": "draw recorded frames: shaded meshes with their contacts",
@@ -28,7 +30,7 @@ COMMANDS = {
 }
 
 # Commands that always load rcl.
-NEED_ROS = ("cut", "demo", "echo", "param", "record", "replay", "status", "view")
+NEED_ROS = ("cut", "demo", "echo", "lifecycle", "param", "record", "replay", "status", "view")
 
 EPILOG = """\
 a first tour:
@@ -90,14 +92,19 @@ class _Interrupts:
 def _run(argv, asked) -> int:
     parser = argparse.ArgumentParser(
         prog="hpccd",
-        description="Continuous collision detection of deforming triangle meshes, at home in ROS 2.",
+        description="Continuous collision detection of deforming triangle meshes, with a ROS 2 node.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
     )
+    parser.add_argument("-V", "--version", action="version", version=f"hpccd {package_version()}")
     subparsers = parser.add_subparsers(dest="command", metavar="<command>", required=True)
     run = None
     for name, summary in COMMANDS.items():
-        subparser = subparsers.add_parser(name, help=summary, formatter_class=argparse.RawDescriptionHelpFormatter)
+        # No abbreviations: a script that says --acc would change its meaning when an option is added.
+        subparser = subparsers.add_parser(
+            name, help=summary, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
+        )
         if name == asked:
             module = importlib.import_module(f"hpccd_ros.commands.{name}")
             subparser.description = module.__doc__

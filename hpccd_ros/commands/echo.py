@@ -2,6 +2,7 @@
 """Print the messages of a topic, of any message type that is installed here. The type is that of the topic's
 publishers, and the quality of service is what they offer.
 
+  hpccd echo                               the topics that there are, with their types
   hpccd echo /contacts                     every message, until Ctrl-C
   hpccd echo /meshes/cloth/vertices --once
   hpccd echo /diagnostics -n 5
@@ -16,7 +17,7 @@ from hpccd_ros.commands.waiting import add_wait, check_wait
 
 
 def configure(parser):
-    parser.add_argument("topic", metavar="TOPIC", help="for example /contacts")
+    parser.add_argument("topic", nargs="?", metavar="TOPIC", help="for example /contacts (default: list them)")
     how_many = parser.add_mutually_exclusive_group()
     how_many.add_argument("--once", action="store_const", const=1, dest="count", help="one message, then end")
     how_many.add_argument("-n", type=int, dest="count", metavar="N", help="end after N messages")

@@ -15,13 +15,16 @@ from hpccd_ros.commands.waiting import add_wait, check_wait
 
 
 def configure(parser):
-    parser.add_argument("node", nargs="?", default="", metavar="NODE", help="full name of a node (default: all)")
+    named = parser.add_mutually_exclusive_group()
+    named.add_argument("node", nargs="?", default="", metavar="NODE", help="full name of a node (default: all)")
+    named.add_argument("--node", default="", dest="named", metavar="NODE", help="the same, as in other commands")
     parser.add_argument("--json", action="store_true", help="as a JSON list with one object a node")
     add_wait(parser, "a node, and for its diagnostics")
 
 
 def run(args) -> int:
     check_wait(args)
+    args.node = args.node or args.named
     from hpccd_ros.introspection import status
 
     return status.main(args)

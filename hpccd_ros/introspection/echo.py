@@ -22,6 +22,9 @@ from hpccd_ros.middleware.message_types import message_class
 _DEPTH = 100
 # s between two looks at what the publishers offer.
 _LOOK_EVERY = 0.2
+# s in which nodes are discovered before topics are listed.
+_SETTLE = 1.0
+_OF_EVERY_NODE = ("/rosout", "/parameter_events")
 # s without a message, after which it is said that none has come.
 _QUIET = 3.0
 
@@ -29,6 +32,8 @@ _QUIET = 3.0
 def main(args) -> int:
     """Print messages until as many as ``args`` asks for have come, or until SIGINT or SIGTERM."""
     with peer.peer("echo") as (node, stop):
+        if args.topic is None:
+            return _list(node, args.wait, stop)
         topic = _resolved(node, args.topic)
         type_name = _type(node, topic, args.wait, stop)
         try:
@@ -36,6 +41,23 @@ def main(args) -> int:
         except LookupError as error:
             raise UserError(f"{topic}: {error}; install the package of this message type") from error
         _Printer(node, topic, message_type, args).run(stop)
+    return 0
+
+
+def _list(node: Node, wait: float, stop: Sequence) -> int:
+    """Print the topics with their types."""
+    found: dict[str, str] = {}
+    deadline, settled = time.monotonic() + wait, 0.0
+    while not found or time.monotonic() < settled:
+        if not found and time.monotonic() > deadline:
+            raise UserError(f"no topics on {graph.domain()}; start a node, or {graph.elsewhere()}")
+        _wait(node, stop)
+        topics = node.get_topic_names_and_types()
+        found = {name: listed(types) for name, types in topics if name not in _OF_EVERY_NODE}
+        settled = settled or (time.monotonic() + _SETTLE if found else 0.0)
+    width = max(map(len, found))
+    for name, types in sorted(found.items()):
+        print(f"{name:{width}}  {types}")
     return 0
 
 
@@ -52,7 +74,7 @@ def _type(node: Node, topic: str, wait: float, stop: Sequence) -> str:
     deadline = time.monotonic() + wait
     while topic not in (found := dict(node.get_topic_names_and_types())):
         if time.monotonic() > deadline:
-            names = [name for name in found if not name.startswith(("/rosout", "/parameter_events"))]
+            names = [name for name in found if name not in _OF_EVERY_NODE]
             there = f" (there are: {listed(names)})" if names else ""
             raise UserError(
                 f"{topic}: no such topic on {graph.domain()}{there}; start its publisher, or {graph.elsewhere()}"

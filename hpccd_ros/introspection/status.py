@@ -18,8 +18,8 @@ from hpccd_ros.params import node_parameters
 
 _DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 _REMEDIES = {
-    "unconfigured": "configure and activate it, or start it with autostart: true",
-    "inactive": "activate it, or start it with autostart: true",
+    "unconfigured": "run hpccd lifecycle configure, then activate, or start it with autostart: true",
+    "inactive": "run hpccd lifecycle activate, or start it with autostart: true",
 }
 # For frames that were dropped without another cause.
 _REASONS = "; docs/troubleshooting.md has the meaning of each reason"

@@ -58,7 +58,7 @@ class Configuration:
             if configured() and (wanted["stop_distance"] < 0) != (self.settings["stop_distance"] < 0):
                 return (
                     f"stop_distance: {wanted['stop_distance']} would switch the topic stop on or off, which it may not "
-                    "be while the node is configured; deactivate and clean up first"
+                    "be while the node is configured; run hpccd lifecycle deactivate, then cleanup"
                 )
             return self._check(wanted, meshes)
 

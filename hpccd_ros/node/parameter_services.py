@@ -2,7 +2,7 @@
 """rclpy's services that set parameters, with what they lack: a check of the type that a value claims to have, integers
 where floats are wanted, and words for names that the node does not have."""
 
-from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue, SetParametersResult
+from rcl_interfaces.msg import Parameter, ParameterDescriptor, ParameterType, ParameterValue, SetParametersResult
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy import parameter
 from rclpy.node import Node
@@ -10,6 +10,18 @@ from rclpy.node import Node
 from hpccd_ros.params import values
 
 TYPES = {kind.value for kind in parameter.Parameter.Type}
+# As in docs/parameters.md.
+_WORDS = {
+    ParameterType.PARAMETER_BOOL: "bool",
+    ParameterType.PARAMETER_INTEGER: "int",
+    ParameterType.PARAMETER_DOUBLE: "float",
+    ParameterType.PARAMETER_STRING: "string",
+    ParameterType.PARAMETER_BYTE_ARRAY: "byte[]",
+    ParameterType.PARAMETER_BOOL_ARRAY: "bool[]",
+    ParameterType.PARAMETER_INTEGER_ARRAY: "int[]",
+    ParameterType.PARAMETER_DOUBLE_ARRAY: "float[]",
+    ParameterType.PARAMETER_STRING_ARRAY: "string[]",
+}
 
 
 def replace_callbacks(node: Node) -> None:
@@ -55,9 +67,17 @@ def _rejection(node: Node, given: Parameter) -> SetParametersResult | None:
         reason = f"{given.name}: type {given.value.type} is not valid; use one of rcl_interfaces/msg/ParameterType"
     elif not node.has_parameter(given.name):
         reason = values.undeclared(given.name, node.list_parameters([], 0).names)
+    elif wrong := _wrong_type(node.describe_parameter(given.name), _as_declared(node, given).value.type):
+        reason = f"{given.name}: {wrong}"
     else:
         return None
     return SetParametersResult(successful=False, reason=reason)
+
+
+def _wrong_type(wanted: ParameterDescriptor, given: int) -> str:
+    if given in (wanted.type, ParameterType.PARAMETER_NOT_SET) or wanted.dynamic_typing:
+        return ""
+    return f"expected {_WORDS[wanted.type]}, got {_WORDS[given]}; docs/parameters.md has the type of each parameter"
 
 
 def _as_declared(node: Node, given: Parameter) -> Parameter:

@@ -176,7 +176,10 @@ def watch(
             values = part(wanted, wanted_meshes)
             value = normalise(row, parameter.value)
             if row.change == UNCONFIGURED and configured() and value != values[row.name]:
-                reason = f"{parameter.name}: read-only while the node is configured; deactivate and clean up first"
+                reason = (
+                    f"{parameter.name}: read-only while the node is configured; run hpccd lifecycle deactivate, then "
+                    "cleanup"
+                )
                 return SetParametersResult(successful=False, reason=reason)
             if reason := unusable_value(row, value):
                 return SetParametersResult(successful=False, reason=reason.replace(row.name, parameter.name, 1))

@@ -10,8 +10,9 @@ import pytest
 from sources import ROOT
 
 from hpccd_ros import cli
+from hpccd_ros.base.version import package_version
 
-ASKING = ("status", "echo", "param")  # a running node
+ASKING = ("status", "echo", "param", "lifecycle")  # a running node
 
 
 @pytest.mark.parametrize("command", cli.COMMANDS)
@@ -29,6 +30,12 @@ def test_the_list_of_commands(capsys):
     shown = capsys.readouterr().out
     for command in ("demo", "record", "replay", "view", "cut", "doctor", "scene", "bench", "info", *ASKING):
         assert f"    {command} " in shown
+
+
+def test_the_version(capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["--version"])
+    assert ended.value.code == 0 and capsys.readouterr().out == f"hpccd {package_version()}\n"
 
 
 def test_help_imports_neither_ros_nor_the_core():

@@ -31,6 +31,7 @@ MISTAKES = {
     ("echo", "/contact", "--wait", "0.1"): "/contact: no such topic on ROS_DOMAIN_ID ",
     ("echo", "meshes/my cloth/vertices"): "'meshes/my cloth/vertices': not a topic name; write it as /contacts or ",
     ("echo", "/contacts", "-n", "0"): "-n 0: must be at least 1",
+    ("lifecycle", "get", "--node", "/nobody/hpccd", "--wait", "0"): "no node /nobody/hpccd found on ROS_DOMAIN_ID ",
     ("param", "get"): "get: got no NAME; write hpccd param get NAME",
     ("param", "set", "accuracy"): "set: got accuracy; write hpccd param set NAME VALUE",
     ("param", "list", "accuracy", "fast"): "list: got accuracy fast; write hpccd param list [NAME]",
@@ -44,7 +45,9 @@ OF_OPTIONS = {
     ("scene", "--size", "big"): "argument --size: invalid float value: 'big'",
     ("record", "--compression", "gzip"): "invalid choice: 'gzip'",
     ("view", "a.mcap", "--step", "1", "--every", "2"): "not allowed with argument",
-    ("echo",): "the following arguments are required: TOPIC",
+    ("status", "--nod", "/hpccd"): "unrecognized arguments: --nod",
+    ("status", "/hpccd", "--node", "/hpccd"): "not allowed with argument",
+    ("lifecycle", "start"): "invalid choice: 'start'",
     ("param", "put", "accuracy", "fast"): "invalid choice: 'put'",
 }
 

@@ -88,3 +88,11 @@ def test_a_topic_that_is_not_there(start_node, hpccd):
     assert f"did you mean {node.namespace}/contacts?" in done.stderr
     done = hpccd("echo", "1contacts")
     assert done.returncode == 2 and "'1contacts': not a topic name; write it as /contacts" in done.stderr
+
+
+def test_topics_are_listed(start_node, hpccd):
+    node = start_node({"meshes": ["cloth"]})
+    done = hpccd("echo")
+    lines = [line.split() for line in done.stdout.splitlines()]
+    assert done.returncode == 0 and [f"{node.namespace}/contacts", "hpccd/msg/ContactArray"] in lines
+    assert [f"{node.namespace}/meshes/cloth/vertices", "hpccd/msg/MeshVertices"] in lines and lines == sorted(lines)

@@ -48,6 +48,9 @@ def test_set(param, name, given, shown):
         (("set", "accuracy", "exakt"), "not set: accuracy: 'exakt' is "),
         (("set", "meshes", "[net]"), "not set: "),
         (("set", "threads", "-1"), "not set: "),
+        (("set", "accuracy", "5"), "not set: accuracy: expected string, got int; docs/parameters.md has the type of "),
+        (("set", "outputs", "normals"), "not set: outputs: expected string[], got string; "),
+        (("set", "meshes", "[1, 2]"), "not set: meshes: expected string[], got int[]; "),
         (
             ("get", "acuracy"),
             "acuracy: NODE has no such parameter, or it has no value; `hpccd param list` shows all; "

@@ -71,7 +71,10 @@ def test_a_node_that_is_not_configured(start_node, hpccd):
     node = start_node({"meshes": ["cloth"], "autostart": False}, wait=False)
     done = hpccd("status", "--wait", "60", f"{node.namespace}/hpccd")
     assert done.returncode == 1 and f"{node.namespace}/hpccd: unconfigured\n" in done.stdout
-    assert "  wrong: the node is unconfigured, so it detects nothing; configure and activate it" in done.stdout
+    assert (
+        "  wrong: the node is unconfigured, so it detects nothing; run hpccd lifecycle configure, then activate"
+        in done.stdout
+    )
     everywhere = hpccd("status", "--json")
     assert f"{node.namespace}/hpccd" in [one["node"] for one in json.loads(everywhere.stdout)]
 

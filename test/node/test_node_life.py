@@ -209,7 +209,7 @@ def test_scene_is_changed_while_unconfigured(start_node):
         result = set_parameter(node, name, value)
         assert not result.successful and f"{name}: read-only while the node is configured" in result.reason
     assert change_state(node, Transition.TRANSITION_DEACTIVATE)
-    assert "deactivate and clean up first" in set_parameter(node, "stamp_match", "nearest").reason
+    assert "run hpccd lifecycle deactivate, then cleanup" in set_parameter(node, "stamp_match", "nearest").reason
     assert change_state(node, Transition.TRANSITION_CLEANUP)
     for name, value in changes:
         assert set_parameter(node, name, value).successful, name

@@ -154,7 +154,10 @@ def test_changes_at_run_time(node_with):
     rejections = {
         "accuracy": ("fast", "fast is not built"),
         "report": ("some", "report: 'some' is not valid; use one of"),
-        "frame_queue": (4, "frame_queue: read-only while the node is configured; deactivate and clean up first"),
+        "frame_queue": (
+            4,
+            "frame_queue: read-only while the node is configured; run hpccd lifecycle deactivate, then cleanup",
+        ),
         "mesh.a.static": (True, "mesh.a.static: read-only while"),
         "meshes": (["b"], "read-only"),
         "threads": (-4, "range"),
