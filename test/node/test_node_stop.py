@@ -414,7 +414,7 @@ def test_the_life_cycle_makes_it_true(start_stream):
     assert change_state(stream.node, Transition.TRANSITION_DEACTIVATE)
     assert change_state(stream.node, Transition.TRANSITION_CLEANUP)
     stream.expect(True)
-    stream.node.wait_until(lambda: stream.listener.reason.startswith("0 of 1 publishers"), "no publisher")
+    stream.node.wait_until(lambda: "0 of 1 publisher alive" in stream.listener.reason, "no publisher")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
