@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _core, arguments, device_arrays
-from .answers import OfDistances, OfIntersections, OfMotion, OfProximity, OfStep, Options
 from .array_types import ArrayLike, MeshName, Positions, Stream
 from .contacts import Contacts
 from .device_results import DeviceContacts, DeviceIntersections, DeviceProximity
@@ -37,6 +36,7 @@ from .options import (
     Simd,
 )
 from .proximity import Gap, Intersections, Proximity
+from .result_types import DistancesResult, IntersectionsResult, MotionResult, Options, ProximityResult, StepResult
 from .scene import Scene
 from .snapshot_queries import SnapshotQueries
 
@@ -65,7 +65,9 @@ def _require_device(backend: str, method: str) -> None:
         raise ValueError(f"results: 'device' is not offered by method {method!r}, which runs on CPUs; use 'default'")
 
 
-class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfProximity, OfIntersections, OfDistances]):
+class Detector(
+    MotionQueries[MotionResult, StepResult], SnapshotQueries[ProximityResult, IntersectionsResult, DistancesResult]
+):
     """Finds every contact of a scene whose vertices move on straight lines from one set of positions to the next.
 
     The scene is copied: meshes and rules that change later do not reach this detector.
@@ -275,7 +277,7 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfProximity, OfI
             "Detector from that where it is used"
         )
 
-    def step(self, vertices: Positions, stream: Stream = None) -> OfMotion:
+    def step(self, vertices: Positions, stream: Stream = None) -> MotionResult:
         """Contacts of the motion from the positions of the last call to these.
 
         Parameters
@@ -302,7 +304,7 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfProximity, OfI
                 found = self._step_on_device(vertices, made_on)
             else:
                 found = self._step_on_host(vertices, made_on)
-            return cast(OfMotion, found)
+            return cast(MotionResult, found)
 
     def _step_on_host(self, vertices: object, stream: int | None) -> Any:
         if self._last_on_device:

@@ -86,7 +86,7 @@ def stream_number(stream: object) -> int | None:
 
 
 def on_host(vertices: NDArray[Any], stream: int | None) -> _core.Positions | NDArray[Any]:
-    """For the core: with a stream that may still read rows of an answer on the device that nobody holds any more."""
+    """For the core: with a stream that may still read rows of a result on the device that nobody holds any more."""
     return vertices if stream is None else _core.Positions(vertices, stream)
 
 

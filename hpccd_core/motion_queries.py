@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 from . import _core, arguments, device_arrays, device_results
 from ._core import Positions as CorePositions
-from .answers import OfMotion, OfStep
 from .array_types import DeviceArrayLike, Positions, Stream
 from .contacts import Contacts
 from .device_arrays import DevicePositions
 from .mesh_layout import MeshLayout
 from .options import Results
 from .prepared import PreparedDetection
+from .result_types import MotionResult, StepResult
 from .results import result_of, with_outputs
 
 
-class MotionQueries(Generic[OfMotion, OfStep]):
+class MotionQueries(Generic[MotionResult, StepResult]):
     """Queries of the motion from one set of positions to the next."""
 
     worlds: int | None
@@ -31,7 +31,7 @@ class MotionQueries(Generic[OfMotion, OfStep]):
     _layout: MeshLayout
     _outputs: tuple[str, ...]
 
-    def detect(self, vertices_t0: Positions, vertices_t1: Positions, stream: Stream = None) -> OfMotion:
+    def detect(self, vertices_t0: Positions, vertices_t1: Positions, stream: Stream = None) -> MotionResult:
         """Contacts of the straight-line motion from `vertices_t0` to `vertices_t1`.
 
         Parameters
@@ -57,9 +57,9 @@ class MotionQueries(Generic[OfMotion, OfStep]):
             If a shape is wrong, a coordinate is NaN, infinite or too large, or a static mesh moves.
         """
         found = self._of_motion("detect", vertices_t0, vertices_t1, stream)
-        return cast(OfMotion, self._contacts(found))
+        return cast(MotionResult, self._contacts(found))
 
-    def collision_free_step(self, vertices_t0: Positions, vertices_t1: Positions, stream: Stream = None) -> OfStep:
+    def collision_free_step(self, vertices_t0: Positions, vertices_t1: Positions, stream: Stream = None) -> StepResult:
         """The largest fraction of the motion that is certainly free of contacts.
 
         Parameters
@@ -86,7 +86,7 @@ class MotionQueries(Generic[OfMotion, OfStep]):
         from the same start are faster from the second call on, at "exact" and "conservative".
         """
         times: NDArray[np.float64] = self._of_motion("collision_free_steps", vertices_t0, vertices_t1, stream)
-        return cast(OfStep, float(times[0]) if self.worlds is None else times)
+        return cast(StepResult, float(times[0]) if self.worlds is None else times)
 
     def prepare(
         self, vertices_t0: DeviceArrayLike, vertices_t1: DeviceArrayLike, room: float = 2.0, stream: Stream = None

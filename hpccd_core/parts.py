@@ -17,12 +17,12 @@ from .results import result_of, with_outputs
 _ARRAYS = (("vf", "uint32", (2,)), ("vf_toc", "float64", ()), ("ee", "uint32", (4,)), ("ee_toc", "float64", ()))
 
 
-def contacts_of_step(answers: Sequence[tuple[Contacts, int, int]]) -> Contacts:
+def contacts_of_step(results: Sequence[tuple[Contacts, int, int]]) -> Contacts:
     """The contacts of the parts of a step as those of the step: each pair once, as the first of the parts reports it.
 
     Parameters
     ----------
-    answers : sequence of (Contacts, int, int)
+    results : sequence of (Contacts, int, int)
         Each (contacts, part, parts): the contacts of part number 0 to parts - 1 of equal duration, or (contacts, 0, 1)
         for the whole step.
 
@@ -38,13 +38,13 @@ def contacts_of_step(answers: Sequence[tuple[Contacts, int, int]]) -> Contacts:
     ValueError
         For a part that the step does not have, contacts of many worlds, or contacts with different outputs.
     """
-    if not isinstance(answers, Iterable):
-        raise TypeError(f"answers: expected a list of (contacts, part, parts), got {type(answers).__name__}")
-    checked = [_checked(f"answers[{k}]", answer) for k, answer in enumerate(answers)]
+    if not isinstance(results, Iterable):
+        raise TypeError(f"results: expected a list of (contacts, part, parts), got {type(results).__name__}")
+    checked = [_checked(f"results[{k}]", result) for k, result in enumerate(results)]
     asked = {name: [name in contacts.outputs for contacts, _, _ in checked if len(contacts)] for name in ROWS}
     for name, those in asked.items():
         if any(those) and not all(those):
-            raise ValueError(f"answers: some have {name} and others do not; use detectors with the same outputs")
+            raise ValueError(f"results: some have {name} and others do not; use detectors with the same outputs")
     outputs = tuple(
         name for name, those in asked.items() if all(those or [name in contacts.outputs for contacts, _, _ in checked])
     )
@@ -65,11 +65,11 @@ def _for_core(contacts: Contacts) -> SimpleNamespace:
     return SimpleNamespace(**arrays, **outputs, first_toc=contacts.first_toc, hash=contacts.hash)
 
 
-def _checked(name: str, answer: object) -> tuple[Contacts, int, int]:
-    if not isinstance(answer, (tuple, list)) or len(answer) != 3:
-        raise TypeError(f"{name}: expected (contacts, part, parts), got {type(answer).__name__}")
-    parts = arguments.whole_number(f"{name}, parts", answer[2], 1, 2**53)
-    return _contacts(name, answer[0]), arguments.whole_number(f"{name}, part", answer[1], 0, parts - 1), parts
+def _checked(name: str, result: object) -> tuple[Contacts, int, int]:
+    if not isinstance(result, (tuple, list)) or len(result) != 3:
+        raise TypeError(f"{name}: expected (contacts, part, parts), got {type(result).__name__}")
+    parts = arguments.whole_number(f"{name}, parts", result[2], 1, 2**53)
+    return _contacts(name, result[0]), arguments.whole_number(f"{name}, part", result[1], 0, parts - 1), parts
 
 
 def _contacts(name: str, contacts: object) -> Contacts:

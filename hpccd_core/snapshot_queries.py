@@ -6,15 +6,15 @@ from __future__ import annotations
 from typing import Any, Generic, cast
 
 from . import _core, arguments, device_arrays, device_results
-from .answers import OfDistances, OfIntersections, OfProximity
 from .array_types import Positions, Stream
 from .mesh_layout import MeshLayout
 from .options import Results
 from .proximity import Gap, Intersections, Proximity
+from .result_types import DistancesResult, IntersectionsResult, ProximityResult
 from .results import result_of, with_outputs
 
 
-class SnapshotQueries(Generic[OfProximity, OfIntersections, OfDistances]):
+class SnapshotQueries(Generic[ProximityResult, IntersectionsResult, DistancesResult]):
     """Queries of positions at one time. Coordinates may be as large as 1e300."""
 
     worlds: int | None
@@ -25,7 +25,7 @@ class SnapshotQueries(Generic[OfProximity, OfIntersections, OfDistances]):
     _layout: MeshLayout
     _outputs: tuple[str, ...]
 
-    def proximity(self, vertices: Positions, distance: float, stream: Stream = None) -> OfProximity:
+    def proximity(self, vertices: Positions, distance: float, stream: Stream = None) -> ProximityResult:
         """All vertex-face and edge-edge pairs within a distance of each other.
 
         Parameters
@@ -53,10 +53,10 @@ class SnapshotQueries(Generic[OfProximity, OfIntersections, OfDistances]):
         found = self._ask("proximity", vertices, stream, distance)
         on_device = self.results == "device"
         if on_device:
-            return cast(OfProximity, device_results.proximity_of(found, self._outputs, self._layout))
-        return cast(OfProximity, result_of(Proximity, with_outputs(found, self._outputs), self._layout))
+            return cast(ProximityResult, device_results.proximity_of(found, self._outputs, self._layout))
+        return cast(ProximityResult, result_of(Proximity, with_outputs(found, self._outputs), self._layout))
 
-    def intersections(self, vertices: Positions, stream: Stream = None) -> OfIntersections:
+    def intersections(self, vertices: Positions, stream: Stream = None) -> IntersectionsResult:
         """All edges that intersect or touch a face with which they share no vertex, coplanar ones included.
 
         Parameters
@@ -79,10 +79,10 @@ class SnapshotQueries(Generic[OfProximity, OfIntersections, OfDistances]):
         found = self._ask("intersections", vertices, stream)
         on_device = self.results == "device"
         if on_device:
-            return cast(OfIntersections, device_results.intersections_of(found, self._layout))
-        return cast(OfIntersections, result_of(Intersections, found, self._layout))
+            return cast(IntersectionsResult, device_results.intersections_of(found, self._layout))
+        return cast(IntersectionsResult, result_of(Intersections, found, self._layout))
 
-    def distances(self, vertices: Positions, stream: Stream = None) -> OfDistances:
+    def distances(self, vertices: Positions, stream: Stream = None) -> DistancesResult:
         """The smallest distance of each pair of meshes that the scene enables, within a mesh too.
 
         Parameters
@@ -114,9 +114,9 @@ class SnapshotQueries(Generic[OfProximity, OfIntersections, OfDistances]):
             for a, b, distance, kind, features, points in self._ask("distances", vertices, stream)
         ]
         if self.worlds is None:
-            return cast(OfDistances, gaps)
+            return cast(DistancesResult, gaps)
         n = len(gaps) // self.worlds
-        return cast(OfDistances, [gaps[k * n : (k + 1) * n] for k in range(self.worlds)])
+        return cast(DistancesResult, [gaps[k * n : (k + 1) * n] for k in range(self.worlds)])
 
     def _ask(self, query: str, vertices: object, stream: object, *more: float) -> Any:
         made_on = device_arrays.stream_number(stream)

@@ -78,13 +78,13 @@ class _Interrupts:
         self.came = False
         self._ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler
         if self._ours:
-            signal.signal(signal.SIGINT, self._answer)
+            signal.signal(signal.SIGINT, self._response)
 
     def close(self):
         if self._ours:
             signal.signal(signal.SIGINT, signal.default_int_handler)
 
-    def _answer(self, number, frame):
+    def _response(self, number, frame):
         self.came = True
         raise KeyboardInterrupt
 

@@ -59,7 +59,7 @@ def start_node(tmp_path):
 
 @pytest.fixture
 def small_bag():
-    """The recording that the repository holds: 90 frames, 89 answers, accuracy exact."""
+    """The recording that the repository holds: 90 frames, 89 results, accuracy exact."""
     from sources import ROOT
 
     return ROOT / "bags" / "cloth-drop-small.mcap"

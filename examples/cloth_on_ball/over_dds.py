@@ -21,16 +21,16 @@ from hpccd_ros.demo.children import Children
 from hpccd_ros.middleware.fields import stamp_to_ns
 from hpccd_ros.scenes import files
 
-# s for the node to be there, or to answer.
+# s for the node to be there, or to respond.
 PATIENCE = 60.0
-# Of every answer.
+# QoS of every response.
 ACCURACY = "exact"
 # What the node computes beside the contacts, and that it sends all of them.
 PARAMETERS = {"outputs": ["normals", "closest"], "max_contacts": 0}
 
 
 def write_parameters(scene, path: Path) -> None:
-    """Write parameters of a node that knows the meshes and answers these questions."""
+    """Write parameters of a node that knows the meshes and handles these queries."""
     files.write_parameters(scene, path)
     with open(path, "a", encoding="utf-8") as file:
         for name, value in PARAMETERS.items():
@@ -62,7 +62,7 @@ def started_node(scene, threads: int, recording: Path | None):
 
 
 class OverDds(Queries):
-    """Asks the node of this name. Each frame that is made is streamed to it, and its answer awaited."""
+    """Asks the node of this name. Each frame that is made is streamed to it, and its response awaited."""
 
     def __init__(self, setup, meshes, name: str):
         super().__init__()
@@ -76,7 +76,7 @@ class OverDds(Queries):
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self._service = self._node.create_client(Detect, f"{name}/detect")
-        self._answered = -1
+        self._last_result = -1
         self._node.create_subscription(ContactArray, client.CONTACTS_TOPIC, self._take, QoSProfile(depth=10))
         self._vertices = [
             self._node.create_publisher(MeshVertices, client.vertices_topic(mesh.name), client.VERTICES_QOS)
@@ -91,7 +91,7 @@ class OverDds(Queries):
         self._frames, self._begin = 0, self._node.get_clock().now().nanoseconds
 
     def __enter__(self):
-        self._await(self._service.service_is_ready, f"no node {self._name} answers: start one, or name another")
+        self._await(self._service.service_is_ready, f"no node {self._name} responds: start one, or name another")
         self._await(
             lambda: all(p.get_subscription_count() for p in (*self._topologies, *self._vertices)),
             f"node {self._name} does not listen to these meshes: start it with the file that --params writes",
@@ -106,9 +106,9 @@ class OverDds(Queries):
     def near(self, start, end):
         with self._timed():
             question = {"query": "contacts", "minimum_separation": [self._setup.reach]}
-            answer = self._ask(self._request(start, end, **question)).contacts
-            found = client.scene_contacts(answer, self._layout)
-            if not answer.total == len(found.normals) == len(found.closest):
+            response = self._ask(self._request(start, end, **question)).contacts
+            found = client.scene_contacts(response, self._layout)
+            if not response.total == len(found.normals) == len(found.closest):
                 raise UserError(
                     f"node {self._name} leaves out pairs, normals or nearest points: start it with the file that "
                     "--params writes"
@@ -127,12 +127,14 @@ class OverDds(Queries):
             return self._ask(self._request(positions, positions, query="intersections")).contacts.total
 
     def made(self, positions):
-        """Stream the frame, and wait for the node's answer to the step that it ends: nothing is dropped."""
+        """Stream the frame, and wait for the node's response to the step that it ends: nothing is dropped."""
         stamp = self._begin + round(self._frames * self._setup.period * 1e9)
         for publisher, message in zip(self._vertices, self._messages(positions, stamp), strict=True):
             publisher.publish(message)
         if self._frames:  # the first frame only begins a step
-            self._await(lambda: self._answered >= stamp, f"node {self._name} did not answer frame {self._frames}")
+            self._await(
+                lambda: self._last_result >= stamp, f"node {self._name} returned no result for frame {self._frames}"
+            )
         self._frames += 1
 
     def _by_mesh(self, positions):
@@ -153,12 +155,14 @@ class OverDds(Queries):
         while True:
             future = self._service.call_async(request)
             self._executor.spin_until_future_complete(future, timeout_sec=PATIENCE)
-            answer = future.result() if future.done() else None
-            if answer is not None and answer.success:
-                return answer
+            response = future.result() if future.done() else None
+            if response is not None and response.success:
+                return response
             # At first it may not have the topologies yet.
-            if answer is None or self._frames or time.monotonic() > deadline:
-                raise UserError(f"node {self._name}: {answer.message if answer else f'no answer in {PATIENCE:.0f} s'}")
+            if response is None or self._frames or time.monotonic() > deadline:
+                raise UserError(
+                    f"node {self._name}: {response.message if response else f'no response in {PATIENCE:.0f} s'}"
+                )
             time.sleep(0.1)
 
     def _await(self, ready, otherwise):
@@ -169,4 +173,4 @@ class OverDds(Queries):
             self._executor.spin_once(timeout_sec=0.05)
 
     def _take(self, message):
-        self._answered = max(self._answered, stamp_to_ns(message.header.stamp))
+        self._last_result = max(self._last_result, stamp_to_ns(message.header.stamp))

@@ -40,7 +40,7 @@ Divided into parts, with the separation grown by the bounds, the contact is foun
 Notes
 -----
 Pairs of meshes that both go straight, as a cloth with itself, need no cut and no margin: ask them in a detector of
-their own, whose scene ignores the other pairs, once for the whole step, and give its answer to `merged` as ``whole``.
+their own, whose scene ignores the other pairs, once for the whole step, and give its result to `merged` as ``whole``.
 The other detector ignores them (a mesh with itself: ``self_collision=False``). Where most triangles are cloth that
 saves most of the time of a step that is cut.
 

@@ -34,13 +34,13 @@ def merged(found: Sequence[hc.Contacts], parts: int, whole: hc.Contacts | None =
         If there are more results than parts or none, or results of many worlds.
     """
     if not 1 <= len(found) <= parts:
-        raise ValueError(f"found: answers of {len(found)} parts, the step has {parts}")
-    answers = [(contacts, part, parts) for part, contacts in enumerate(found)]
+        raise ValueError(f"found: results of {len(found)} parts, the step has {parts}")
+    results = [(contacts, part, parts) for part, contacts in enumerate(found)]
     if whole is not None:
-        answers.insert(0, (whole, 0, 1))
-    if any(contacts.slices is not None for contacts, _, _ in answers):
-        raise ValueError("found: answers of many worlds; give those of each world by itself")
-    return found[0] if len(answers) == parts == 1 else contacts_of_step(answers)
+        results.insert(0, (whole, 0, 1))
+    if any(contacts.slices is not None for contacts, _, _ in results):
+        raise ValueError("found: results of many worlds; give those of each world by itself")
+    return found[0] if len(results) == parts == 1 else contacts_of_step(results)
 
 
 def earliest(contacts: hc.Contacts) -> hc.Contacts:

@@ -155,7 +155,7 @@ def outcomes(rows: Sequence[dict]) -> list[Outcome]:
 
 
 def front(found: Sequence[Outcome]) -> list[Outcome]:
-    """Those that no other one which asks for the same beats in time, in wrong answers and in the error of times."""
+    """Those that no other one which asks for the same beats in time, in wrong results and in the error of times."""
 
     def values(o: Outcome) -> tuple[float, ...]:
         return o.ms, o.wrong, o.values["error"]
@@ -178,7 +178,7 @@ def nearest(found: Sequence[Outcome], bounds: Sequence[Bound]) -> Outcome:
     """The setting that exceeds its worst bound by the smallest factor."""
 
     def beyond(o: Outcome) -> float:
-        least = 1e-300  # so that any answer is far beyond a bound of zero
+        least = 1e-300  # so that any result is far beyond a bound of zero
         return max((o.values[b.quantity] / max(b.limit, least) for b in o.broken(bounds)), default=0.0)
 
     return min(found, key=lambda o: (beyond(o), o.ms))

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from hpccd_ros.client.names import belongs, check
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import Separation
-from hpccd_ros.middleware import answer_fields, contact_messages
-from hpccd_ros.middleware.answer_fields import read_features
+from hpccd_ros.middleware import contact_messages, result_fields
 from hpccd_ros.middleware.contact_messages import SceneContacts
+from hpccd_ros.middleware.result_fields import read_features
 
 
 def field(message: Any, name: str, dtype: type[Any], shape: tuple[int, ...]) -> NDArray[Any]:
@@ -46,7 +46,7 @@ class ContactArrays:
     mesh_names : tuple of str
         Meshes of the scene.
     n_vertex_face, n_edge_edge, n_edge_face : int
-        Number of contacts of each kind, in this order. Edge-face ones only answer the query ``intersections``.
+        Number of contacts of each kind, in this order. Edge-face contacts come only from query ``intersections``.
     mesh_a, mesh_b : ndarray, shape (N,), uint32
         The mesh of each side: indices into `mesh_names`.
     features_a : ndarray, shape (N, 2), uint32
@@ -152,7 +152,7 @@ def contacts_from_message(message: ContactArray) -> ContactArrays:
 def _separation_of(message: ContactArray) -> Separation:
     """The separation in force. Raises ValueError where the fields that tell it do not fit together."""
     try:
-        return answer_fields.read_separation(message)
+        return result_fields.read_separation(message)
     except ValueError as error:
         raise ValueError(f"message: {error}") from None
 

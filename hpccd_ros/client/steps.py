@@ -109,10 +109,10 @@ def collision_free_step_from_response(response: Detect.Response | DetectAction.R
         If the request was for another query.
     """
     if not response.success:
-        raise RuntimeError(f"the node did not answer: {response.message}")
+        raise RuntimeError(f"the node computed nothing: {response.message}")
     step = float(response.collision_free_step)
     if not 0 <= step <= 1:
-        raise ValueError(f"response: collision_free_step is {step}; it is the answer to query {_QUERY} only")
+        raise ValueError(f"response: collision_free_step is {step}; it is the result of query {_QUERY} only")
     return step
 
 

@@ -17,8 +17,8 @@ from hpccd_ros.middleware import environment, stop_signals, topic_names
 class Monitor:
     """Listens to `contacts` and to the diagnostics of the node.
 
-    answers: steps that the node has answered so far. step, contacts, first_toc: of the last one received. most: largest
-    number of contacts and its step. dropped: frames dropped by the node. core_ms: median of the core's time for a
+    results: steps that the node has processed so far. step, contacts, first_toc: of the last one received. most:
+    largest number of contacts and its step. dropped: frames dropped by the node. core_ms: median of the core's time for a
     frame, None until the node has reported it. first_received, last_received: when the first and the last result was
     received (monotonic, s).
     """
@@ -36,7 +36,7 @@ class Monitor:
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self._received = 0
-        self.answers = self.step = self.contacts = self.dropped = 0
+        self.results = self.step = self.contacts = self.dropped = 0
         self.first_toc = float("inf")
         self.most = (0, 0)
         self.core_ms: float | None = None
@@ -77,17 +77,17 @@ class Monitor:
             values = {pair.key: pair.value for pair in status.values}
             if status.name.endswith(": detection") and "detect_ms.p50" in values:
                 self.core_ms = float(values["detect_ms.p50"])
-                # This process may be late for some of the answers themselves; the node's own count misses none.
+                # This process may be late for some of the results themselves; the node's own count misses none.
                 self._count(int(values["detections"]))
             elif status.name.endswith(": frames"):
                 self.dropped = max([self.dropped, *_dropped(values).values()])
 
-    def _count(self, answers):
-        if answers > self.answers:
+    def _count(self, results):
+        if results > self.results:
             self.last_received = time.monotonic()
-            if self.answers == 0:
+            if self.results == 0:
                 self.first_received = self.last_received
-            self.answers = answers
+            self.results = results
 
 
 def _dropped(values) -> Counter:

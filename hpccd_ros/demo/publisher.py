@@ -14,7 +14,7 @@ PATIENCE = 120.0
 
 
 def main(name: str, size: float, frames: int, rate: float) -> int:
-    count = publish(scenes.make(name, size, frames), rate, wait=PATIENCE, subscribers=2, answered=True)
+    count = publish(scenes.make(name, size, frames), rate, wait=PATIENCE, subscribers=2, await_results=True)
     print(f"published {count} frames", flush=True)
     return 0
 

@@ -139,11 +139,11 @@ def _stream(args, scene, folder, recording, parameters, console):
         for child in (recorder, node):
             if children.end(child) != 0:
                 children.check()
-        if monitor.answers == 0:
-            raise UserError(f"the node answered nothing; see the logs in {folder}")
+        if monitor.results == 0:
+            raise UserError(f"the node sent no results; see the logs in {folder}")
         core = "" if monitor.core_ms is None else f", {monitor.core_ms:.1f} ms a frame in the core (median)"
         console.print(
-            f"[bold]answers[/]    {monitor.answers} of {steps} steps, {monitor.dropped} frames dropped{core}"
+            f"[bold]results[/]    {monitor.results} of {steps} steps, {monitor.dropped} frames dropped{core}"
             f"{_slower(monitor, scene.n_frames, args.rate)}"
         )
 
@@ -158,21 +158,21 @@ def _steps(scene) -> int:
 def _slower(monitor, frames, rate) -> str:
     """What to say where the scene has played slower than at `rate`."""
     took = monitor.last_received - monitor.first_received
-    planned = (frames - 2) / rate  # from the first answer to the last
+    planned = (frames - 2) / rate  # from the first result to the last
     if took < 1.25 * planned + 1.0:
         return ""
-    return f"; it took {took:.0f} instead of {planned:.0f} s: each frame waits for the answer to the one before"
+    return f"; it took {took:.0f} instead of {planned:.0f} s: each frame waits for the result of the one before"
 
 
 def _await_recorded(path, monitor, children):
-    """Wait until all answers are on the disk: a recorder that is told to end takes only what has reached it."""
+    """Wait until all results are on the disk: a recorder that is told to end takes only what has reached it."""
     deadline = time.monotonic() + WRITTEN
-    while _recorded_answers(path) < monitor.answers and time.monotonic() < deadline:
+    while _recorded_results(path) < monitor.results and time.monotonic() < deadline:
         children.check()
         monitor.listen(0.25)
 
 
-def _recorded_answers(path) -> int:
+def _recorded_results(path) -> int:
     return sum(count for topic, count in examine(path).counts.items() if topic.endswith("/contacts"))
 
 
@@ -191,20 +191,20 @@ def _watch(monitor, children, publisher, steps, console):
     shown = -1
     with progress:
         bar = progress.add_task("steps", total=steps, status="")
-        while publisher.running or (monitor.answers < steps and not _silent(monitor)):
+        while publisher.running or (monitor.results < steps and not _silent(monitor)):
             monitor.listen(0.1)
             children.check()
             status = _state(monitor)
-            progress.update(bar, completed=monitor.answers, status=status)
-            if not console.is_terminal and monitor.answers // 10 > shown:
-                shown = monitor.answers // 10
+            progress.update(bar, completed=monitor.results, status=status)
+            if not console.is_terminal and monitor.results // 10 > shown:
+                shown = monitor.results // 10
                 console.print(f"           frame {monitor.step:4}: {status}")
     children.check()
 
 
 def _silent(monitor) -> bool:
-    """Whether no more answers are to be expected; on a busy machine the first may be late."""
-    return time.monotonic() - monitor.last_received >= (3.0 if monitor.answers else 60.0)
+    """Whether no more results are to be expected; on a busy machine the first may be late."""
+    return time.monotonic() - monitor.last_received >= (3.0 if monitor.results else 60.0)
 
 
 def _state(monitor) -> str:
@@ -236,7 +236,7 @@ def _verify_and_draw(args, scene, folder, path, picture, console):
             "computed again from the recording, the contacts differ from those that the node sent: "
             f"{replay.first_divergence.difference}; please report it with {kept}"
         )
-    console.print(f"[bold]verified[/]   {replay.verified} recorded answers, computed again from the file: all equal")
+    console.print(f"[bold]verified[/]   {replay.verified} recorded results, computed again from the file: all equal")
     console.print("[bold]picture[/]    rendering the frame with most contacts ...")
     draw_step(worst, picture, history, title=scene.title, **drawn)
     return worst

@@ -3,7 +3,7 @@
 
 Code that drops a message returns a `Rejection` to its caller; counters at the end add them up. The unit is one vertex
 message of one mesh, so that the counts add up:
-received + lost in the middleware = answered + dropped + still waiting.
+received + lost in the middleware = processed + dropped + still waiting.
 """
 
 import threading

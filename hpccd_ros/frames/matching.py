@@ -63,7 +63,7 @@ class ExactMatcher:
 
     def add(self, mesh: str, frame: MeshFrame) -> Matched:
         if self._closed_up_to is not None and frame.stamp <= self._closed_up_to:
-            text = f"stamp {frame.stamp} ns was already answered or given up"
+            text = f"stamp {frame.stamp} ns was already processed or given up"
             return Matched([], [Rejection(mesh, Reason.LATE, text)])
         group = self._pending.setdefault(frame.stamp, {})
         group[mesh] = frame

@@ -2,7 +2,7 @@
 """The messages that a node has taken, in order: its frames depend on them. No ROS.
 
 Topics are received independently of each other: only the receiver knows the order of messages across topics. Each
-answer therefore lists the messages taken since the previous answer (ContactArray.input_topic), and a replay follows
+result therefore lists the messages taken since the previous result (ContactArray.input_topic), and a replay follows
 that order.
 """
 
@@ -19,7 +19,7 @@ STOPPED = f"{EVENT}stopped"
 RESTART_AFTER = f"{EVENT}restart_after"  # sent: the value
 _ROBOTS = f"{EVENT}robots"
 
-# Inputs kept until the next answer, which may never come: half a minute of ten topics at 60 Hz, 2 MB.
+# Inputs kept until the next result, which may never come: half a minute of ten topics at 60 Hz, 2 MB.
 MOST_UNREPORTED = 20_000
 
 
@@ -44,7 +44,7 @@ def known_robots(event: str) -> list[str] | None:
 
 
 class TakenInputs:
-    """The inputs taken since the last answer. ``count``: of all so far. One thread adds them, another reports them."""
+    """The inputs taken since the last result. ``count``: of all so far. One thread adds them, another reports them."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""rclpy's action server with limits, and with a shutdown that answers all waiting clients.
+"""rclpy's action server with limits, and with a shutdown that responds to all waiting clients.
 
 rclpy 7.1 stores the request and the result of each goal as long as results are kept, by default 15 minutes, of a clock
 that may be simulated and stand still. This module overrides and reads rclpy's private methods and fields.

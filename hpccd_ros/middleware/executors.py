@@ -78,7 +78,7 @@ class GuardedExecutor(SingleThreadedExecutor):
         super().__init__(context=context)
         self._errors = errors
         self._in_a_row = 0
-        self._answering: weakref.WeakSet[Service] = weakref.WeakSet()
+        self._responding: weakref.WeakSet[Service] = weakref.WeakSet()
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         try:
@@ -112,19 +112,19 @@ class GuardedExecutor(SingleThreadedExecutor):
         return super()._make_handler(entity, node, guarded)
 
     def _take_service(self, service: Service) -> Any:
-        if service not in self._answering:
-            self._answering.add(service)
-            service.callback = self._answer_always(service.callback, _name(service))
+        if service not in self._responding:
+            self._responding.add(service)
+            service.callback = self._respond_always(service.callback, _name(service))
         return super()._take_service(service)
 
-    def _answer_always(self, callback: Callable, where: str) -> Callable:
-        async def answer(request: Any, response: Any) -> Any:
+    def _respond_always(self, callback: Callable, where: str) -> Callable:
+        async def respond(request: Any, response: Any) -> Any:
             try:
                 return await await_or_execute(callback, request, response)
             except Exception as error:
                 return _failed(type(response)(), request, self._caught(where, error))
 
-        return answer
+        return respond
 
     def _caught(self, where: str, error: Exception) -> str:
         if not self.context.ok():  # then all calls of rclpy fail

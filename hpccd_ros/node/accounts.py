@@ -21,7 +21,7 @@ REJECTED_BESIDE_MESHES = {Input.TRANSFORM: "transforms_rejected", Input.JOINT_ST
 class Accounts:
     """``dropped``: vertex messages. ``connections``: reports of the middleware about topics (name -> count).
 
-    ``static_taken``: accepted messages of static meshes, which count as answered. ``requests``: to ~/detect, service
+    ``static_taken``: accepted messages of static meshes, which count as processed. ``requests``: to ~/detect, service
     and action, by how they ended. ``inputs``: those taken since the node was configured. ``heard``: topics
     (relative names) of closed subscriptions that had a message since then. warn: logs a text.
     on_rejected: called with each rejection, in the thread that rejects. on_received: called with each input message:
@@ -35,7 +35,7 @@ class Accounts:
         self.topologies_rejected = RejectionCounter()
         self.metrics = Metrics()
         self.connections: Counter = Counter()
-        self.requests = Counter(answered=0, rejected=0, busy=0, timed_out=0, failed=0, stopped=0, canceled=0)
+        self.requests = Counter(succeeded=0, rejected=0, busy=0, timed_out=0, failed=0, stopped=0, canceled=0)
         self.restarts = 0
         self.static_taken = 0
         self.heard: set[str] = set()
@@ -69,7 +69,7 @@ class Accounts:
             (self.topologies_rejected if rejection.what is Input.TOPOLOGY else self.dropped).count(rejection)
         self.on_rejected(rejection)
 
-    def answered(self, found: Detection, total: int, sent: int) -> None:
+    def processed(self, found: Detection, total: int, sent: int) -> None:
         """Count a step: ``total`` contacts were found, ``sent`` of them have just been published."""
         latency_ms = 1e3 * (time.monotonic() - found.end.received)
         near = found.near
@@ -93,7 +93,7 @@ class Accounts:
         times = latency_ms, found.detect_ms
         self.metrics.detected(len(found.end.fresh), *times, found.profile, last, near, _coarse(found))
 
-    def unanswered(self, frame: SceneFrame, reason: Reason) -> None:
+    def not_processed(self, frame: SceneFrame, reason: Reason) -> None:
         """Count a frame that was passed to the detection and has no result."""
         for rejection in frame.rejected(reason):
             self.rejected(rejection)

@@ -17,7 +17,7 @@ from hpccd_ros.params import parameters, robot_parameters, scene_parameters, unk
 from hpccd_ros.params.robot_parameters import NO_ROBOTS, Robots
 from hpccd_ros.params.table import ROBOT
 from hpccd_ros.params.values import ParameterError
-from hpccd_ros.record.recorded_topics import ANSWERS, POSITIONS
+from hpccd_ros.record.recorded_topics import POSITIONS, RESULTS
 
 Meshes = dict[str, dict[str, Any]]
 
@@ -118,7 +118,7 @@ class Configuration:
 
 # Types of the node's own topics, and of those that every ROS node has.
 _PUBLISHED = {
-    **ANSWERS,
+    **RESULTS,
     topic_names.STOP: "std_msgs/msg/Bool",
     topic_names.MARKERS: "visualization_msgs/msg/MarkerArray",
     topic_names.SURFACE: message_types.POINTS,

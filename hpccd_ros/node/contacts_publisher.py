@@ -14,7 +14,7 @@ from visualization_msgs.msg import MarkerArray
 from hpccd_ros.detect.pair_summary import summarise
 from hpccd_ros.detect.step_detector import Detection
 from hpccd_ros.frames.taken_inputs import TakenInputs
-from hpccd_ros.middleware import answer_fields, contact_messages, fields, qos, snapshot_messages, topic_names
+from hpccd_ros.middleware import contact_messages, fields, qos, result_fields, snapshot_messages, topic_names
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.node.markers import contact_markers, surface_cloud
 
@@ -52,13 +52,13 @@ class ContactsPublisher:
             max_contacts=self._settings["max_contacts"],
             outputs=tuple(self._settings["outputs"]),
         )
-        answer_fields.fill_separation(message, found.options.separation)
-        answer_fields.fill_features(message, found.options.features)
-        answer_fields.fill_bounds(message, found.bounds)
+        result_fields.fill_separation(message, found.options.separation)
+        result_fields.fill_features(message, found.options.features)
+        result_fields.fill_bounds(message, found.bounds)
         message.dropped_frames = dropped_frames
         last = found.end.inputs
-        answer_fields.fill_inputs(message, taken.pop_until(last), start=found.start.inputs, end=last)
-        answer_fields.fill_report(message, found.options.report)
+        result_fields.fill_inputs(message, taken.pop_until(last), start=found.start.inputs, end=last)
+        result_fields.fill_report(message, found.options.report)
         self._contacts.publish(message)
         if found.gaps is not None:
             self._publish_distances(found, message.header)

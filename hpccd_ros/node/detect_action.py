@@ -94,12 +94,12 @@ class DetectAction:
         name = bytes(goal.goal_id.uuid)
         _, ticket = self._open[name]
         try:
-            result = await self._jobs.answer(goal.request, Detect.Result(), ticket)
+            result = await self._jobs.fill(goal.request, Detect.Result(), ticket)
         finally:
             del self._open[name]
             if not self._open:
                 self._timer.cancel()
-        if ticket.ended == "answered":
+        if ticket.ended == "succeeded":
             self._server.keep(goal, result, len(result.contacts.kind))
             goal.succeed()
         elif ticket.ended == "canceled":

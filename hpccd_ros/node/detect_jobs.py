@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Requests to ``~/detect``, from service and action: queued, computed outside the executor, answered."""
+"""Requests to ``~/detect``, from service and action: queued, computed outside the executor."""
 
 import math
 import threading
@@ -19,7 +19,7 @@ from hpccd_ros.detect.kept_detectors import KeptDetectors
 from hpccd_ros.middleware import topic_names
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.configuration import Configuration
-from hpccd_ros.node.detect_query import Answer, Request, RequestError, Response
+from hpccd_ros.node.detect_query import QueryResult, Request, RequestError, Response
 from hpccd_ros.node.detect_request import NodeScene, compute
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 
@@ -27,7 +27,7 @@ from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 LONGEST = 86_400.0
 # The remedy for large requests, by query.
 _LESS = {"contacts": "ask for less (report first), or ", "proximity": "ask for a smaller distance, or "}
-STOPPED = "stopped: the node was shut down or cleaned up before the answer was ready; ask again when it is active"
+STOPPED = "stopped: the node was shut down or cleaned up before the result was ready; ask again when it is active"
 
 R = TypeVar("R", bound=Response)
 
@@ -44,7 +44,7 @@ class Ticket:
         self.ended = ""
         self.time_limit = math.nan
         self.given_up: tuple[str, str] | None = None  # how it is to end, and the reason in words
-        self.settle: Callable[[], None] = lambda: None  # whoever waits for its answer waits no longer
+        self.settle: Callable[[], None] = lambda: None  # whoever waits for its result waits no longer
         self.cancellation = Cancellation()
         self._since = time.monotonic()
 
@@ -58,7 +58,7 @@ class Ticket:
         self.stage = stage
 
     def give_up(self, ended: str, why: str) -> None:
-        """Answer it with ``why`` now, unless it was given up before. Called by the executor's thread."""
+        """End it with ``why`` now, unless it was given up before. Called by the executor's thread."""
         if self.given_up is None:
             self.given_up = ended, why
             self.cancellation.cancel()
@@ -68,9 +68,9 @@ class Ticket:
 class DetectJobs:
     """Computes ``detect_jobs`` requests at a time; ``detect_waiting`` more may wait, others are rejected.
 
-    If the time limit of a request has passed, if it is given up, or if this is closed, the request is answered with the
+    If the time limit of a request has passed, if it is given up, or if this is closed, the request ends with the
     reason and its computation is cancelled; its place is free when that ends.
-    scene: the state of the node, requested in the executor for each request; or a text: why it cannot answer now.
+    scene: the state of the node, requested in the executor for each request; or a text: why it cannot compute now.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class DetectJobs:
         return {**self._ended, "open": self._open}
 
     def count(self, ended: str) -> None:
-        """Count a request that ended this way before it reached `answer`."""
+        """Count a request that ended this way before it reached `fill`."""
         self._ended[ended] += 1
 
     def forget_scenes(self, unused_for: float) -> None:
@@ -112,12 +112,12 @@ class DetectJobs:
             return {ticket: place for place, ticket in enumerate(self._waiting)}
 
     def close(self) -> None:
-        """Give up all requests; `answer` continues, with a rejection, when its task runs next."""
+        """Give up all requests; `fill` continues, with a rejection, when its task runs next."""
         for ticket in tuple(self._awaited):
             ticket.give_up("stopped", STOPPED)
         self._pool.shutdown(wait=False, cancel_futures=True)
 
-    async def answer(self, request: Request, response: R, ticket: Ticket) -> R:
+    async def fill(self, request: Request, response: R, ticket: Ticket) -> R:
         """Fill `response` with the result or with the reason why there is none; see ``ticket.ended``."""
         try:
             return await self._computed(request, response, ticket)
@@ -166,25 +166,25 @@ class DetectJobs:
                 response,
                 ticket,
                 "timed_out",
-                f"time limit of {limit:g} s passed before the answer was ready; "
+                f"time limit of {limit:g} s passed before the result was ready; "
                 f"{_LESS.get(request.query or 'contacts', '')}set a longer time_limit",
             )
         try:
-            answer = job.result()
+            result = job.result()
         except RequestError:
             raise
         except CORE_ERRORS as error:
             return self.reject(response, ticket, "failed", f"{type(error).__name__}: {error}")
-        if answer.contacts is not None:
-            response.contacts = answer.contacts
-        if answer.distances is not None:
-            response.distances = answer.distances
-        response.collision_free_step = answer.collision_free_step
-        response.success, response.message = True, answer.text
-        self._end(ticket, "answered")
+        if result.contacts is not None:
+            response.contacts = result.contacts
+        if result.distances is not None:
+            response.distances = result.distances
+        response.collision_free_step = result.collision_free_step
+        response.success, response.message = True, result.text
+        self._end(ticket, "succeeded")
         return response
 
-    def _compute(self, request: Request, scene: NodeScene, options: Any, ticket: Ticket) -> Answer:
+    def _compute(self, request: Request, scene: NodeScene, options: Any, ticket: Ticket) -> QueryResult:
         with self._lock:
             self._waiting.pop(ticket, None)
         return compute(request, scene, options, self._settings, self._kept, ticket.cancellation, ticket.enter)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The queries of ``~/detect``, service and action: what each takes, and its answer."""
+"""The queries of ``~/detect``, service and action: what each takes, and its result."""
 
 import math
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from hpccd_ros.base.quoting import counted, not_one_of, shortened
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NONE, Separation
-from hpccd_ros.middleware import answer_fields, contact_messages, snapshot_messages
+from hpccd_ros.middleware import contact_messages, result_fields, snapshot_messages
 
 # Of the service and of the action: the same fields.
 Request = Detect.Request | DetectAction.Goal
@@ -31,7 +31,7 @@ WRITING = DetectAction.Feedback.WRITING
 
 
 class RequestError(ValueError):
-    """A request that cannot be answered; the text says what to fix."""
+    """An invalid request; the text says what to fix."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,8 @@ OF_FEATURES = (*OF_MOTION, "proximity")
 def requested_query(request: Request) -> Query:
     """Raises RequestError: no such query, or an argument that it has no use for."""
     name = request.query or "contacts"
-    if name not in ANSWERS:
-        raise RequestError(f"query: {not_one_of(name, list(ANSWERS))}")
+    if name not in QUERIES:
+        raise RequestError(f"query: {not_one_of(name, list(QUERIES))}")
     separation = _length(request, "minimum_separation", name, of=OF_MOTION)
     distance = _length(request, "distance", name, of=("proximity",))
     if name != "contacts" and request.report not in ("", "all"):
@@ -110,7 +110,7 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Answer:
+class QueryResult:
     """``text``: in words what was found. The rest: the fields of the response that the query fills."""
 
     text: str
@@ -119,51 +119,51 @@ class Answer:
     collision_free_step: float = math.nan
 
 
-def _contacts(asked: Asked, query: Query) -> Answer:
+def _contacts(asked: Asked, query: Query) -> QueryResult:
     message = ContactArray()
     found = asked.detector.detect(asked.start, asked.end)
     asked.enter(WRITING)
     contact_messages.fill_contacts(
         message, found, asked.layout, max_contacts=asked.max_contacts, outputs=asked.options.outputs
     )
-    answer_fields.fill_separation(message, asked.options.separation)
-    answer_fields.fill_features(message, asked.options.features)
-    return Answer(counted(message.total, "contact"), contacts=message)
+    result_fields.fill_separation(message, asked.options.separation)
+    result_fields.fill_features(message, asked.options.features)
+    return QueryResult(counted(message.total, "contact"), contacts=message)
 
 
-def _collision_free_step(asked: Asked, query: Query) -> Answer:
+def _collision_free_step(asked: Asked, query: Query) -> QueryResult:
     step = asked.detector.collision_free_step(asked.start, asked.end)
-    return Answer(f"{step!r} of the motion is free of contacts", collision_free_step=step)
+    return QueryResult(f"{step!r} of the motion is free of contacts", collision_free_step=step)
 
 
-def _proximity(asked: Asked, query: Query) -> Answer:
+def _proximity(asked: Asked, query: Query) -> QueryResult:
     message = ContactArray()
     near = asked.detector.proximity(asked.end, query.distance)
     asked.enter(WRITING)
     snapshot_messages.fill_proximity(
         message, near, asked.layout, max_contacts=asked.max_contacts, outputs=asked.options.outputs
     )
-    answer_fields.fill_features(message, asked.options.features)
-    return Answer(f"{counted(message.total, 'pair')} within {query.distance:g}", contacts=message)
+    result_fields.fill_features(message, asked.options.features)
+    return QueryResult(f"{counted(message.total, 'pair')} within {query.distance:g}", contacts=message)
 
 
-def _intersections(asked: Asked, query: Query) -> Answer:
+def _intersections(asked: Asked, query: Query) -> QueryResult:
     message = ContactArray()
     hits = asked.detector.intersections(asked.end)
     asked.enter(WRITING)
     snapshot_messages.fill_intersections(message, hits, asked.layout, max_contacts=asked.max_contacts)
-    return Answer(f"{counted(message.total, 'edge')} in faces", contacts=message)
+    return QueryResult(f"{counted(message.total, 'edge')} in faces", contacts=message)
 
 
-def _distances(asked: Asked, query: Query) -> Answer:
+def _distances(asked: Asked, query: Query) -> QueryResult:
     message = DistanceArray()
     gaps = asked.detector.distances(asked.end)
     asked.enter(WRITING)
     snapshot_messages.fill_distances(message, gaps, asked.layout)
-    return Answer(f"{counted(len(gaps), 'pair')} of meshes", distances=message)
+    return QueryResult(f"{counted(len(gaps), 'pair')} of meshes", distances=message)
 
 
-ANSWERS: dict[str, Callable[[Asked, Query], Answer]] = {
+QUERIES: dict[str, Callable[[Asked, Query], QueryResult]] = {
     "contacts": _contacts,
     "collision_free_step": _collision_free_step,
     "proximity": _proximity,

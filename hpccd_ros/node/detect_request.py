@@ -17,12 +17,12 @@ from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.types import Topology
 from hpccd_ros.middleware import fields, mesh_messages
 from hpccd_ros.node.detect_query import (
-    ANSWERS,
     BUILDING,
     DETECTING,
+    QUERIES,
     READING,
-    Answer,
     Asked,
+    QueryResult,
     Request,
     RequestError,
     requested_query,
@@ -45,7 +45,7 @@ def compute(
     kept: KeptDetectors,
     cancellation: Cancellation,
     enter: Callable[[str], None] = lambda stage: None,
-) -> Answer:
+) -> QueryResult:
     """limits: max_meshes, max_vertices, max_faces, max_edges, max_contacts. kept: of earlier requests; this one adds to
     them. enter: told of each stage of the work when it begins. Raises RequestError, and what the core raises.
     """
@@ -80,18 +80,18 @@ def compute(
     layout = Layout.of(tuple(names), topologies)
     asked = Asked(start, end, detector, layout, options, limits["max_contacts"], enter)
     enter(DETECTING)
-    answer = ANSWERS[query.name](asked, query)
+    result = QUERIES[query.name](asked, query)
     backend = detector.backend
     if cancellation.release():
         kept.keep(used)
-    for message in (answer.contacts, answer.distances):
+    for message in (result.contacts, result.distances):
         if message is not None:
             message.header, message.step = request.end[0].header, request.end[0].step
             message.accuracy, message.backend = options.accuracy, backend
-    if answer.contacts is not None:
+    if result.contacts is not None:
         first = request.end if query.of_snapshot else request.start
-        answer.contacts.start = first[0].header.stamp
-    return answer
+        result.contacts.start = first[0].header.stamp
+    return result
 
 
 def _choice(field: str, value: str, choices: tuple[str, ...]) -> str:

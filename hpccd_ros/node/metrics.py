@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-# Percentiles are taken over the last answers: p99 needs some hundreds.
+# Percentiles are taken over the last results: p99 needs some hundreds.
 WINDOW = 1000
 
 
@@ -18,7 +18,7 @@ class Metrics:
         self._lock = threading.Lock()
         self.received: dict[str, int] = {}
         self.last_stamps: dict[str, int] = {}  # ns, of the last message of a mesh or topic that could be read
-        self.answered = 0
+        self.processed = 0
         self.detections = 0
         self.first_frames = 0
         self.near = 0
@@ -49,7 +49,7 @@ class Metrics:
         """A frame of ``messages`` vertex messages was only the start of the next step."""
         with self._lock:
             self.first_frames += 1
-            self.answered += messages
+            self.processed += messages
 
     def detected(
         self,
@@ -61,12 +61,12 @@ class Metrics:
         near: int = 0,
         coarse: str = "",
     ) -> None:
-        """One step was answered. latency_ms: from the arrival of its last message to its contacts sent. near: pairs of
+        """One step was processed. latency_ms: from the arrival of its last message to its contacts sent. near: pairs of
         features that came nearer than their meshes' separation. coarse: which mesh's motion is known less well than it
         should be, in words."""
         with self._lock:
             self.detections += 1
-            self.answered += messages
+            self.processed += messages
             self.near += near
             if coarse:
                 self.coarse += 1
@@ -91,7 +91,7 @@ class Metrics:
             return {
                 "received": dict(self.received),
                 "last_stamps": dict(self.last_stamps),
-                "answered": self.answered,
+                "processed": self.processed,
                 "detections": self.detections,
                 "first_frames": self.first_frames,
                 "near": self.near,

@@ -189,7 +189,7 @@ class HpccdNode(GuardedLifecycleNode):
         """Called by the detection thread."""
         dropped = self._accounts.dropped.most_of(self._deforming)
         message = self._contacts.publish(found, dropped, self._accounts.inputs)
-        self._accounts.answered(found, message.total, len(message.kind))
+        self._accounts.processed(found, message.total, len(message.kind))
         self._contacts.show(found, message.header)
 
     def _give_back(self) -> None:

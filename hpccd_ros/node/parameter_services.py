@@ -25,7 +25,7 @@ _WORDS = {
 
 
 def replace_callbacks(node: Node) -> None:
-    """Values of a type that does not exist are rejected with a reason; rclpy 7.1 raises, and nobody is answered.
+    """Values of a type that does not exist are rejected with a reason; rclpy 7.1 raises, and the client gets no response.
     Integers become floats where the parameter is one: `ros2 param set` takes a number without a point for an integer.
     """
     for service in node.services:
@@ -36,7 +36,7 @@ def replace_callbacks(node: Node) -> None:
 
 
 def _each(node, set_parameters):
-    def answer(request: SetParameters.Request, response: SetParameters.Response) -> SetParameters.Response:
+    def respond(request: SetParameters.Request, response: SetParameters.Response) -> SetParameters.Response:
         for given in request.parameters:
             if (rejected := _rejection(node, given)) is None:
                 one = SetParameters.Request(parameters=[_as_declared(node, given)])
@@ -45,11 +45,11 @@ def _each(node, set_parameters):
                 response.results.append(rejected)
         return response
 
-    return answer
+    return respond
 
 
 def _all(node, set_atomically):
-    def answer(
+    def respond(
         request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
     ) -> SetParametersAtomically.Response:
         for given in request.parameters:
@@ -59,7 +59,7 @@ def _all(node, set_atomically):
         request.parameters = [_as_declared(node, given) for given in request.parameters]
         return set_atomically(request, response)
 
-    return answer
+    return respond
 
 
 def _rejection(node: Node, given: Parameter) -> SetParametersResult | None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where the process of the node begins: told to end before it has begun, it ends as told.
 
-Loading the rest takes half a second, in which Python's own answer to SIGINT would be a traceback. What comes before
+Loading the rest takes half a second, in which Python's own response to SIGINT would be a traceback. What comes before
 these lines is the interpreter's own start.
 """
 

@@ -54,7 +54,7 @@ class Reporter:
         now = time.monotonic()
         period, self._time = max(now - self._time, 1e-9), now
         data = self._accounts.metrics.snapshot()
-        data["answered"] += self._accounts.static_taken
+        data["processed"] += self._accounts.static_taken
         out = DiagnosticArray()
         out.header.stamp = stamp
         out.status = [
@@ -89,7 +89,7 @@ class Reporter:
         came = sum(data["received"].values()) - sum(self._received.values())
         values |= {
             "received": sum(data["received"].values()),
-            "answered": data["answered"],
+            "processed": data["processed"],
             "waiting": waiting,
             "dropped": sum(dropped.values()),
             "restarts": accounts.restarts,

@@ -175,7 +175,7 @@ class StreamDetection:
     def _failed(self, frame: SceneFrame, error: Exception) -> None:
         """Called by the detection thread."""
         stopped = isinstance(error, Cancelled)
-        self._accounts.unanswered(frame, Reason.STOPPED if stopped else Reason.DETECTION_FAILED)
+        self._accounts.not_processed(frame, Reason.STOPPED if stopped else Reason.DETECTION_FAILED)
         if stopped or not self._node.context.ok():
             return  # shutting down: the publisher is gone, nothing failed
         if not isinstance(error, CORE_ERRORS):

@@ -15,7 +15,7 @@ from hpccd_ros.base.errors import UserError
 from hpccd_ros.middleware import graph
 
 # s; twice as long each time, as a slow node would be flooded. A response is lost if the node discovers the client only
-# after it has answered. Once a client has received one, no later one is lost for that reason.
+# after it has responded. Once a client has received one, no later one is lost for that reason.
 ASK_AGAIN = 1.0
 
 
@@ -27,20 +27,20 @@ def of(node) -> dict:
 def fetch(node, remote: str, wait: float, stop: Sequence = ()) -> dict:
     """{name: value} of all parameters that are set in the node with the full name `remote`, asked through `node`.
 
-    Raises UserError naming the nodes that are there if `remote` does not answer within `wait` seconds, and
+    Raises UserError naming the nodes that are there if `remote` does not respond within `wait` seconds, and
     KeyboardInterrupt once there is something in `stop`, which a signal's handler may see to.
     """
     deadline = time.monotonic() + wait
     ask = functools.partial(call, node, deadline=deadline, remote=remote, stop=stop)
     names = ask(ListParameters, f"{remote}/list_parameters", [ListParameters.Request()])
-    # One request for each: a node answers a request for several with nothing if one of them was never set.
+    # One request for each: a node returns nothing for a request for several if one of them was never set.
     wanted = sorted(names[0].result.names)
     requests = [GetParameters.Request(names=[name]) for name in wanted]
-    answers = ask(GetParameters, f"{remote}/get_parameters", requests)
+    responses = ask(GetParameters, f"{remote}/get_parameters", requests)
     return {
-        name: _plain(parameter_value_to_python(answer.values[0]))
-        for name, answer in zip(wanted, answers, strict=True)
-        if answer.values
+        name: _plain(parameter_value_to_python(response.values[0]))
+        for name, response in zip(wanted, responses, strict=True)
+        if response.values
     }
 
 
@@ -57,14 +57,14 @@ def call(node, service, name, requests, *, deadline, remote, stop=()):
         for request in requests:  # one after the other: the queue of a service holds ten
             asked, futures = time.monotonic(), [client.call_async(request)]
             patience = max(deadline, asked + 2.0)
-            while not (answered := [future for future in futures if future.done()]):
+            while not (ready := [future for future in futures if future.done()]):
                 if time.monotonic() > patience:
                     raise UserError(f"{name}: the node {remote} does not respond; wait, or start it again")
                 if not results and time.monotonic() > asked + ASK_AGAIN * (2 ** len(futures) - 1):
                     futures.append(client.call_async(request))
                 _spin_once(node, stop)
-            results.append(answered[0].result())
-            # A slow node answers the copies before the next request: that time is not the next one's.
+            results.append(ready[0].result())
+            # A slow node responds to the copies before the next request: that time is not the next one's.
             now = time.monotonic()
             copies_end = now + (now - asked) * (len(futures) - 1)
             while time.monotonic() < copies_end and not all(future.done() for future in futures):

@@ -292,7 +292,7 @@ SERVICE_ROWS = (
         "detect_waiting",
         "int",
         8,
-        "Requests that may wait. Up to 1,000 more are answered as busy",
+        "Requests that may wait. Up to 1,000 more are rejected as busy",
         span=(0, 10_000),
     ),
     Row(

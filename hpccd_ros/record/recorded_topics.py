@@ -35,7 +35,7 @@ POSITIONS = {
     topic_names.POSE: POSE,
 }
 # Relative name -> type of results of the node.
-ANSWERS = {topic_names.CONTACTS: CONTACTS, topic_names.DISTANCES: DISTANCES, topic_names.PAIRS: PAIRS}
+RESULTS = {topic_names.CONTACTS: CONTACTS, topic_names.DISTANCES: DISTANCES, topic_names.PAIRS: PAIRS}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,7 +75,7 @@ def of_node(parameters: dict) -> list[Wanted]:
     wanted += [Wanted(topic, DESCRIPTION, latched=1) for topic in described]
     wanted += [Wanted(topic, JOINT_STATES) for topic in robot_parameters.joint_topics(robots)]
     # Distances and summaries too: they may be switched on at any time.
-    return [*wanted, *(Wanted(name, type_name) for name, type_name in ANSWERS.items())]
+    return [*wanted, *(Wanted(name, type_name) for name, type_name in RESULTS.items())]
 
 
 def types_by_role(meshes, robots: RobotValues) -> dict[str, str]:
@@ -87,7 +87,7 @@ def types_by_role(meshes, robots: RobotValues) -> dict[str, str]:
         **{topic.name: topic.type_name for topic in transform_topics.ALL.values()},
         **dict.fromkeys(robot_parameters.topics(robots).values(), DESCRIPTION),
         **dict.fromkeys(robot_parameters.joint_topics(robots), JOINT_STATES),
-        **ANSWERS,
+        **RESULTS,
     }
 
 
@@ -107,7 +107,7 @@ def as_node_asks(node, name: str, topic: Wanted, depth: int, *, recorded, vertic
     are reliable, unless parameters of the node (qos_overrides) change it.
     """
     default = vertices if topic.type_name in (*POSITIONS.values(), JOINT_STATES) else ReliabilityPolicy.RELIABLE
-    entity = "publisher" if topic.type_name in ANSWERS.values() else "subscription"
+    entity = "publisher" if topic.type_name in RESULTS.values() else "subscription"
     asked = qos_overrides.reliability(recorded, entity, name, default)
     return _profile(asked == ReliabilityPolicy.RELIABLE, topic, depth)
 

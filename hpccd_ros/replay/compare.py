@@ -7,7 +7,7 @@ from hpccd_core.options import ACCURACIES
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NO_BOUNDS, MotionBounds
 from hpccd_ros.middleware import contact_messages
-from hpccd_ros.middleware.answer_fields import read_bounds, read_separation
+from hpccd_ros.middleware.result_fields import read_bounds, read_separation
 
 
 def difference(
@@ -25,7 +25,7 @@ def difference(
     if then != now:
         return f"topology versions {then} were recorded, now they are {now}"
     if problem := _malformed(recorded, layout):
-        return f"the recorded answer is malformed: {problem}"
+        return f"the recorded result is malformed: {problem}"
     if (then := read_bounds(recorded)) != bounds:
         return f"motion was bounded by {_bounded(then)}, now it is by {_bounded(bounds)}"
     if any_one:

@@ -17,7 +17,7 @@ from hpccd_ros.middleware import fields
 from hpccd_ros.middleware.fields import InvalidMessageError
 from hpccd_ros.middleware.snapshot_messages import fill_distances
 from hpccd_ros.replay.frames import PATIENCE, FrameWindow
-from hpccd_ros.replay.input_order import OrderedAnswer
+from hpccd_ros.replay.input_order import OrderedResult
 
 # Fields of DistanceArray, and how many entries each has for a pair of meshes.
 # Not approach_speed: the recording may lack the previous snapshot.
@@ -48,8 +48,8 @@ class DistanceCheck:
         self._detector = detector
         self._accuracy = accuracy
         self._waiting: list[tuple[int, object]] = []
-        self._beside: dict[OrderedAnswer, list] = defaultdict(list)
-        self._settled: dict[OrderedAnswer, tuple[SceneFrame | None, bool]] = {}
+        self._beside: dict[OrderedResult, list] = defaultdict(list)
+        self._settled: dict[OrderedResult, tuple[SceneFrame | None, bool]] = {}
         self.verified = self.diverged = self.unverified = 0
         self._divergence = self._lack = ""
 
@@ -61,56 +61,56 @@ class DistanceCheck:
         """Add a result, after this number of frames: it may have been written before the last of its positions."""
         self._waiting.append((frames, self.decode(message)))
 
-    def put_of(self, step: OrderedAnswer | None, message, counts: bool) -> None:
+    def put_of(self, step: OrderedResult | None, message, counts: bool) -> None:
         """The recorded distances for a step; None: there are none. counts: whether they are to be verified."""
-        answer = self.decode(message)
+        result = self.decode(message)
         if step is not None:
             step.distances -= 1
         if counts and step is None:
-            self._lacks(f"distances of step {answer.step}: the recording has no contacts of this step")
+            self._lacks(f"distances of step {result.step}: the recording has no contacts of this step")
         elif counts and step in self._settled:
-            self._look_beside(answer, step)
+            self._look_beside(result, step)
         elif counts:
-            self._beside[step].append(answer)
+            self._beside[step].append(result)
         if step is not None and not step.distances:
             self._settled.pop(step, None)
 
-    def settle_of(self, step: OrderedAnswer, frame: SceneFrame | None, counts: bool) -> None:
+    def settle_of(self, step: OrderedResult, frame: SceneFrame | None, counts: bool) -> None:
         """Call it when it is known whether there is a frame at the end of this step. counts: it began within the
         recording."""
         self._settled[step] = frame, counts
-        for answer in self._beside.pop(step, ()):
-            self._look_beside(answer, step)
+        for result in self._beside.pop(step, ()):
+            self._look_beside(result, step)
         if not step.distances:
             del self._settled[step]
 
-    def _look_beside(self, answer, step: OrderedAnswer) -> None:
+    def _look_beside(self, result, step: OrderedResult) -> None:
         frame, counts = self._settled[step]
         if frame is not None:
-            self._look_at(answer, step.end, frame)
+            self._look_at(result, step.end, frame)
         elif counts:
             self._lacks(f"distances at {step.end} ns: their frame is not certain")
 
     def settle(self, window: FrameWindow, frames: int | None = None) -> None:
         """Compare waiting results whose frame exists or can no longer arrive. frames: so far; None: all."""
         still = []
-        for came, answer in self._waiting:
+        for came, result in self._waiting:
             try:
-                stamp = fields.stamp_to_ns(answer.header.stamp)
+                stamp = fields.stamp_to_ns(result.header.stamp)
             except InvalidMessageError as error:
-                self._lacks(f"the answer is malformed: {error}")
+                self._lacks(f"the result is malformed: {error}")
                 continue
             frame = window.get(stamp)
             if frame is not None:
-                self._look_at(answer, stamp, frame)
+                self._look_at(result, stamp, frame)
             elif frames is not None and frames < came + PATIENCE:
-                still.append((came, answer))
+                still.append((came, result))
             elif window.first is None or stamp >= window.first:
                 self._lacks(f"distances at {stamp} ns: the recording has no frame of all meshes with this stamp")
         self._waiting = still
 
-    def _look_at(self, answer, stamp, frame) -> None:
-        accuracy = self._accuracy or answer.accuracy
+    def _look_at(self, result, stamp, frame) -> None:
+        accuracy = self._accuracy or result.accuracy
         if accuracy not in ACCURACIES:
             self._differs(f"distances at {stamp} ns: accuracy {accuracy[:20]!r} is none of {', '.join(ACCURACIES)}")
             return
@@ -120,9 +120,9 @@ class DistanceCheck:
         except CORE_ERRORS as error:
             self._lacks(f"distances at {stamp} ns: the core rejects it: {error}")
             return
-        expected = type(answer)()
+        expected = type(result)()
         fill_distances(expected, gaps, Layout.of(self._detector.mesh_names, frame.topologies))
-        if (why := difference(answer, expected)) is None:
+        if (why := difference(result, expected)) is None:
             self.verified += 1
         else:
             self._differs(f"distances at {stamp} ns: {why}")

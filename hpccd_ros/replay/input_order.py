@@ -22,7 +22,7 @@ from hpccd_ros.frames import taken_inputs
 from hpccd_ros.frames.taken_inputs import TakenInput
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.middleware import fields
-from hpccd_ros.middleware.answer_fields import ListedInputs, read_inputs
+from hpccd_ros.middleware.result_fields import ListedInputs, read_inputs
 from hpccd_ros.replay.frames import FrameSource
 
 _LATEST = 2**63 - 1  # recordings may have later times, lists cannot
@@ -40,14 +40,14 @@ class _FrameKey(NamedTuple):
 
 
 @dataclass(eq=False)
-class OrderedAnswer:
+class OrderedResult:
     """Properties of a result before anything is computed.
 
     ``sent``, ``start``, ``end``: ns. ``problem``: why it cannot be verified, or "". ``listed``: None: it has no list.
     ``session``: how often the node had been configured before, or its process started. ``begun``: inputs of the session
     taken before those that results list without a gap up to this one. ``unlisted``: messages to take before its list.
     ``missing``: the first input of its list that the recording lacks, in words; ``early``: all that it lacks were sent
-    before the first recorded message of their topic. ``answered``: all inputs of its list have been pushed.
+    before the first recorded message of their topic. ``complete``: all inputs of its list have been pushed.
     ``distances``: results about distances for its frame that have not been read.
     """
 
@@ -62,7 +62,7 @@ class OrderedAnswer:
     unlisted: list[Key] = field(default_factory=list)
     missing: str = ""
     early: bool = True
-    answered: bool = False
+    complete: bool = False
     distances: int = 0
 
     @property
@@ -81,7 +81,7 @@ class InputOrder:
     """Reads ``recording`` once; then give it the recorded inputs (`put`), and let it push them into ``source``.
 
     contacts: name of the topic of results; distances: of results about distances, or None. decode: topic -> decoder,
-    for both. ``answers``: results in the order of the recording; ``of_distances``: for each result about distances the
+    for both. ``results``: in the order of the recording; ``of_distances``: for each result about distances the
     result about the same frame, or None. ``made``: frames so far. ``not_taken``: topic -> number of messages that the
     node did not take although it took later ones.
     """
@@ -95,15 +95,15 @@ class InputOrder:
         decode: Mapping[str, Callable[[RecordedMessage], Any]],
     ) -> None:
         self._source = source
-        self.answers: list[OrderedAnswer] = []
+        self.results: list[OrderedResult] = []
         self.made = 0
-        about_distances: list[OrderedAnswer] = []
+        about_distances: list[OrderedResult] = []
         sent: dict[str, array] = defaultdict(lambda: array("q"))
         place: dict[str, array] = defaultdict(lambda: array("q"))
         topics = [*source.topics, contacts, *([distances] if distances else [])]
         for number, message in enumerate(recording.messages(topics)):
             if message.topic == contacts:
-                self.answers.append(_read(decode[contacts](message), message))
+                self.results.append(_read(decode[contacts](message), message))
             elif message.topic == distances:
                 about_distances.append(_read_stamp(decode[distances](message), message))
             else:
@@ -120,7 +120,7 @@ class InputOrder:
         self.of_distances = self._nearest(about_distances)
         self._inbox: dict[Key, deque[RecordedMessage]] = {}
         self._frames: dict[_FrameKey, SceneFrame] = {}
-        self._wanted = Counter(key for answer in self.answers for key in answer.start_keys + answer.end_keys)
+        self._wanted = Counter(key for result in self.results for key in result.start_keys + result.end_keys)
         self._way = self._push_all()
 
     def put(self, message: RecordedMessage) -> None:
@@ -134,13 +134,13 @@ class InputOrder:
         """Push all messages that can be pushed by now."""
         next(self._way, None)
 
-    def frames(self, answer: OrderedAnswer) -> tuple[SceneFrame | None, SceneFrame | None]:
-        """The frames at the start and the end of its step, if they could be made. Call it once, when ``answered``."""
+    def frames(self, result: OrderedResult) -> tuple[SceneFrame | None, SceneFrame | None]:
+        """The frames at the start and the end of its step, if they could be made. Call it once, when ``complete``."""
         start, end = (
             next((self._frames[key] for key in keys if key in self._frames), None)
-            for keys in (answer.start_keys, answer.end_keys)
+            for keys in (result.start_keys, result.end_keys)
         )
-        for key in answer.start_keys + answer.end_keys:
+        for key in result.start_keys + result.end_keys:
             self._wanted[key] -= 1
             if not self._wanted[key]:
                 self._frames.pop(key, None)
@@ -156,9 +156,9 @@ class InputOrder:
         spans = []  # of each run: topic -> first and last time listed
         for run in runs:
             times: dict[str, list[NDArray[np.int64]]] = defaultdict(list)
-            for answer in run:
-                topic, sent = np.asarray(answer.listed.topic), np.asarray(answer.listed.sent, np.int64)
-                for index, name in enumerate(answer.listed.topics):
+            for result in run:
+                topic, sent = np.asarray(result.listed.topic), np.asarray(result.listed.sent, np.int64)
+                for index, name in enumerate(result.listed.topics):
                     times[name].append(sent[topic == index])
             joined = {name: np.concatenate(parts) for name, parts in times.items()}
             spans.append({name: (part.min(), part.max()) for name, part in joined.items() if len(part)})
@@ -193,47 +193,47 @@ class InputOrder:
                 left = (times < of_all[name].max()) & ~np.isin(times, self._uses[name][0])
                 self.not_taken[name] = int(left.sum())
 
-    def _runs(self) -> list[list[OrderedAnswer]]:
+    def _runs(self) -> list[list[OrderedResult]]:
         """Runs of results whose lists continue each other without a gap."""
-        runs: list[list[OrderedAnswer]] = []
+        runs: list[list[OrderedResult]] = []
         session = taken = begun = 0
-        for answer in self.answers:
-            if answer.listed is None:
+        for result in self.results:
+            if result.listed is None:
                 continue
-            before = answer.listed.before
+            before = result.listed.before
             if not runs or before != taken:
                 if runs and not before:
                     session += 1
                 elif runs and before < taken:
                     # A node that was configured again begins its lists at 0. Either its first result was lost, or a
                     # list is wrong; in no case did this list begin before the recording.
-                    answer.problem = answer.problem or "its list does not continue that of the previous answer"
+                    result.problem = result.problem or "its list does not continue that of the previous result"
                 begun = before
                 runs.append([])
-            answer.session, answer.begun, taken = session, begun, answer.listed.end
-            runs[-1].append(answer)
+            result.session, result.begun, taken = session, begun, result.listed.end
+            runs[-1].append(result)
         return runs
 
-    def _nearest(self, about_distances: list[OrderedAnswer]) -> list[OrderedAnswer | None]:
+    def _nearest(self, about_distances: list[OrderedResult]) -> list[OrderedResult | None]:
         """For each result about distances the result about the same frame that was sent with it, or None if that is not
         recorded, even if a result for another frame with the same stamp is."""
-        alike: dict[tuple[int, int], list[OrderedAnswer]] = defaultdict(list)
-        for answer in self.answers:
-            if not answer.problem:
-                alike[answer.step, answer.end].append(answer)
-        found: list[OrderedAnswer | None] = []
-        nearest: dict[OrderedAnswer, tuple[int, int]] = {}  # time between both, number of distances
+        alike: dict[tuple[int, int], list[OrderedResult]] = defaultdict(list)
+        for result in self.results:
+            if not result.problem:
+                alike[result.step, result.end].append(result)
+        found: list[OrderedResult | None] = []
+        nearest: dict[OrderedResult, tuple[int, int]] = {}  # time between both, number of distances
         for number, one in enumerate(about_distances):
             beside = alike.get((one.step, one.end), ())
-            answer = min(beside, key=lambda other, sent=one.sent: abs(other.sent - sent), default=None)
-            found.append(answer)
-            if answer is not None:
-                nearest[answer] = min(nearest.get(answer, (_LATEST, 0)), (abs(answer.sent - one.sent), number))
-        for number, answer in enumerate(found):
-            if answer is not None and nearest[answer][1] != number:
+            result = min(beside, key=lambda other, sent=one.sent: abs(other.sent - sent), default=None)
+            found.append(result)
+            if result is not None:
+                nearest[result] = min(nearest.get(result, (_LATEST, 0)), (abs(result.sent - one.sent), number))
+        for number, result in enumerate(found):
+            if result is not None and nearest[result][1] != number:
                 found[number] = None
-            elif answer is not None:
-                answer.distances += 1
+            elif result is not None:
+                result.distances += 1
         return found
 
     def _uses_left(self, key: Key) -> int:
@@ -253,27 +253,27 @@ class InputOrder:
     def _push_all(self) -> Iterator[None]:
         """Yields whenever the next message has not been read yet."""
         session = None
-        for answer in self.answers:
-            if answer.listed is not None:
-                if answer.session != session:
-                    session = answer.session
-                    self._source.restart(all_known=answer.begun > 0)
-                for key in answer.unlisted:
+        for result in self.results:
+            if result.listed is not None:
+                if result.session != session:
+                    session = result.session
+                    self._source.restart(all_known=result.begun > 0)
+                for key in result.unlisted:
                     while (message := self._take(key)) is None:
                         yield
-                    self._made(answer, _NOT_LISTED, self._source.push(message))
-                for taken in answer.listed:
+                    self._made(result, _NOT_LISTED, self._source.push(message))
+                for taken in result.listed:
                     if taken.topic.startswith(taken_inputs.EVENT):
-                        self._happen(answer, taken)
+                        self._happen(result, taken)
                         continue
                     key = taken.topic, taken.sent
                     if not self._is_recorded(key):
-                        self._lack(answer, taken)
+                        self._lack(result, taken)
                         continue
                     while (message := self._take(key)) is None:
                         yield
-                    self._made(answer, taken.number, self._source.push(message, taken.flags))
-            answer.answered = True
+                    self._made(result, taken.number, self._source.push(message, taken.flags))
+            result.complete = True
 
     def _take(self, key: Key) -> RecordedMessage | None:
         held = self._inbox.get(key)
@@ -285,44 +285,44 @@ class InputOrder:
             del self._inbox[key]
         return held.popleft() if len(held) > 1 else held[0]
 
-    def _made(self, answer: OrderedAnswer, inputs: int, frames: list[SceneFrame]) -> None:
+    def _made(self, result: OrderedResult, inputs: int, frames: list[SceneFrame]) -> None:
         self.made += len(frames)
         for frame in frames:
-            if (key := _FrameKey(answer.session, inputs, frame.stamp)) in self._wanted:
+            if (key := _FrameKey(result.session, inputs, frame.stamp)) in self._wanted:
                 self._frames[key] = frame
 
-    def _happen(self, answer: OrderedAnswer, taken: TakenInput) -> None:
-        if taken.topic == taken_inputs.STOPPED and answer.early:
-            answer.missing = ""  # all that could depend on it was forgotten
+    def _happen(self, result: OrderedResult, taken: TakenInput) -> None:
+        if taken.topic == taken_inputs.STOPPED and result.early:
+            result.missing = ""  # all that could depend on it was forgotten
         try:
-            self._made(answer, taken.number, self._source.happen(taken.topic, taken.sent))
+            self._made(result, taken.number, self._source.happen(taken.topic, taken.sent))
         except ValueError as error:
-            answer.missing, answer.early = answer.missing or str(error), False
+            result.missing, result.early = result.missing or str(error), False
 
-    def _lack(self, answer: OrderedAnswer, taken: TakenInput) -> None:
+    def _lack(self, result: OrderedResult, taken: TakenInput) -> None:
         times = self._recorded.get(taken.topic, ())
-        answer.early &= not len(times) or taken.sent < times[0]
-        answer.missing = answer.missing or (
+        result.early &= not len(times) or taken.sent < times[0]
+        result.missing = result.missing or (
             f"it lists a message of {shortened(taken.topic)} sent at {taken.sent} ns, which the recording lacks"
         )
 
 
-def _read(answer: Any, message: RecordedMessage) -> OrderedAnswer:
-    found = _read_stamp(answer, message)
+def _read(result: Any, message: RecordedMessage) -> OrderedResult:
+    found = _read_stamp(result, message)
     try:
-        found.listed = read_inputs(answer)
+        found.listed = read_inputs(result)
         if found.listed is None:
-            found.problem = "it does not list the inputs taken, although the first answer of the recording does"
-        found.start = fields.stamp_to_ns(answer.start)
+            found.problem = "it does not list the inputs taken, although the first result of the recording does"
+        found.start = fields.stamp_to_ns(result.start)
     except ValueError as error:
-        found.problem = f"the answer is malformed: {error}"
+        found.problem = f"the result is malformed: {error}"
     return found
 
 
-def _read_stamp(answer: Any, message: RecordedMessage) -> OrderedAnswer:
-    found = OrderedAnswer(min(message.publish_time, _LATEST), answer.step)
+def _read_stamp(result: Any, message: RecordedMessage) -> OrderedResult:
+    found = OrderedResult(min(message.publish_time, _LATEST), result.step)
     try:
-        found.end = fields.stamp_to_ns(answer.header.stamp)
+        found.end = fields.stamp_to_ns(result.header.stamp)
     except ValueError as error:
-        found.problem = f"the answer is malformed: {error}"
+        found.problem = f"the result is malformed: {error}"
     return found

@@ -77,7 +77,7 @@ def _cluster(distributed, args, jobs):
         try:
             client = distributed.Client(args.scheduler, timeout="60s")
         except (OSError, ValueError, TimeoutError) as error:
-            raise UserError(f"--scheduler {args.scheduler}: no Dask scheduler answers there: {error}") from error
+            raise UserError(f"--scheduler {args.scheduler}: no Dask scheduler responds there: {error}") from error
         with client:
             workers = len(client.scheduler_info(n_workers=-1)["workers"])
             if not workers:
@@ -139,7 +139,7 @@ def _print(rows) -> None:
             print(f"{row['file']}: {row['result']}" + (f": {row['why']}" if row["why"] else ""))
     good = sum(row["result"] in GOOD for row in rows)
     print(
-        f"{good} of {len(rows)} recordings without a difference, {sum(r.get('verified', 0) for r in rows):,} answers "
+        f"{good} of {len(rows)} recordings without a difference, {sum(r.get('verified', 0) for r in rows):,} results "
         f"verified, {sum(r.get('diverged', 0) for r in rows):,} diverged",
         flush=True,
     )

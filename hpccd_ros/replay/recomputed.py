@@ -16,13 +16,13 @@ from hpccd_ros.frames import taken_inputs
 from hpccd_ros.frames.samples import HISTORY_NS
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.middleware import fields
-from hpccd_ros.middleware.answer_fields import read_features, read_inputs, read_report, read_separation
 from hpccd_ros.middleware.fields import InvalidMessageError
+from hpccd_ros.middleware.result_fields import read_features, read_inputs, read_report, read_separation
 from hpccd_ros.params.table import MOST_PARTS
 from hpccd_ros.replay.compare import difference
 from hpccd_ros.replay.distances import DistanceCheck
 from hpccd_ros.replay.frames import PATIENCE, FrameSource, FrameWindow
-from hpccd_ros.replay.input_order import InputOrder, OrderedAnswer
+from hpccd_ros.replay.input_order import InputOrder, OrderedResult
 from hpccd_ros.replay.recorded_setup import ReplaySetup
 
 # Frames kept for later results; at least as many as can wait in the node.
@@ -75,9 +75,9 @@ class _Session:
     first: int | None = None
     settled: bool = False
 
-    def step_of(self, known: OrderedAnswer, answer, at: float, start_frame, end_frame) -> ReplayedStep:
+    def step_of(self, known: OrderedResult, result, at: float, start_frame, end_frame) -> ReplayedStep:
         """The frames of a step, or why they are missing."""
-        step = ReplayedStep(0, answer.step, known.start, known.end, start_frame, end_frame, answer, at)
+        step = ReplayedStep(0, result.step, known.start, known.end, start_frame, end_frame, result, at)
         step.missing = known.problem or self._lack(known)
         if step.missing:
             return step
@@ -102,13 +102,13 @@ class _Session:
         """Note missing inputs. Only inputs of the first result can be from before the recording."""
         return self.number == 0
 
-    def _lack(self, known: OrderedAnswer) -> str | None:
+    def _lack(self, known: OrderedResult) -> str | None:
         if known.session != self.number:
             self.__init__(self.history, known.session)
         if known.begun != self.begun:
             self.begun = known.begun
             if self.computed or not self._is_first:
-                self.uncertain = self.uncertain or "an earlier answer is missing, and with it the inputs that it lists"
+                self.uncertain = self.uncertain or "an earlier result is missing, and with it the inputs that it lists"
         if not known.missing:
             return None
         if known.early and not self.computed:
@@ -119,7 +119,7 @@ class _Session:
         self.uncertain = self.uncertain or known.missing
         return known.missing
 
-    def _settle(self, known: OrderedAnswer) -> None:
+    def _settle(self, known: OrderedResult) -> None:
         self.first = known.end if self.first is None else self.first
         self.settled = (
             self.settled
@@ -162,10 +162,10 @@ class Replay:
         self._begin, self._end = begin, end
         self._at = 0.0  # seconds into the recording, of the message read last
         self.messages_read = 0
-        answers = recording.topics.get(setup.contacts)
-        self.recorded_answers = answers.count if answers else 0
-        self._decode_answer = make_decoder(answers) if answers else None
-        self._ordered = self.recorded_answers > 0 and self._lists_inputs()
+        results = recording.topics.get(setup.contacts)
+        self.recorded_results = results.count if results else 0
+        self._decode_result = make_decoder(results) if results else None
+        self._ordered = self.recorded_results > 0 and self._lists_inputs()
         self.source = FrameSource(setup, recording.topics, self._ordered)
         builder = setup.builder
         self._detector = StepDetector(builder, self._options(None))
@@ -187,13 +187,13 @@ class Replay:
 
     @property
     def _topics(self):
-        return self.source.topics + ([self._setup.contacts] if self.recorded_answers else []) + self.distances.topics
+        return self.source.topics + ([self._setup.contacts] if self.recorded_results else []) + self.distances.topics
 
     def steps(self) -> Iterator[ReplayedStep]:
         """Each recorded result, computed again; in a recording without results, each step from frame to frame."""
         find = self._successive_frames
-        if self.recorded_answers:
-            find = self._ordered_answers if self._ordered else self._answers
+        if self.recorded_results:
+            find = self._ordered_results if self._ordered else self._results
         number = 0
         for step in find():
             if step.at < self._begin:
@@ -216,23 +216,23 @@ class Replay:
         """Whether the results list the inputs taken, and the recorder stored the times in these lists."""
         first = next(self._recording.messages([self._setup.contacts]))
         try:
-            listed = read_inputs(self._decode_answer(first)) is not None
+            listed = read_inputs(self._decode_result(first)) is not None
         except ValueError:
             listed = True
         return listed and first.publish_time != first.log_time
 
-    def _ordered_answers(self):
+    def _ordered_results(self):
         contacts, distances = self._setup.contacts, next(iter(self.distances.topics), None)
-        decode = {contacts: self._decode_answer, distances: self.distances.decode}
+        decode = {contacts: self._decode_result, distances: self.distances.decode}
         order = InputOrder(self._recording, self.source, contacts, distances, decode)
         self.not_taken = order.not_taken
-        answers, of_distances = iter(order.answers), iter(order.of_distances)
+        results, of_distances = iter(order.results), iter(order.of_distances)
         session = _Session(history=any(not mesh for mesh, _ in self._setup.roles.values()))
         waiting, begun = deque(), False
         for message in self._messages():
             if message.topic == contacts:
                 begun = True
-                waiting.append((next(answers), self._decode_answer(message), self._at))
+                waiting.append((next(results), self._decode_result(message), self._at))
             elif message.topic == distances:
                 step = next(of_distances)
                 # It has no contacts and precedes all others: the recording began between the two messages.
@@ -242,31 +242,31 @@ class Replay:
                 order.put(message)
             order.advance()
             self.frames = order.made
-            while waiting and waiting[0][0].answered:
-                known, answer, at = waiting.popleft()
-                step = session.step_of(known, answer, at, *order.frames(known))
+            while waiting and waiting[0][0].complete:
+                known, result, at = waiting.popleft()
+                step = session.step_of(known, result, at, *order.frames(known))
                 yield step
                 certain = not (step.missing and step.uncertain)
                 self.distances.settle_of(known, step.end_frame if certain else None, counts=not step.before_recording)
 
-    def _answers(self):
+    def _results(self):
         waiting = []
         for message in self._messages():
             if message.topic == self._setup.contacts:
                 # A result may have been written before the last of its messages.
-                waiting.append((self.frames, self._at, self._decode_answer(message)))
+                waiting.append((self.frames, self._at, self._decode_result(message)))
             else:
                 for _ in self._push(message):
                     pass
             while waiting:
-                came, at, answer = waiting[0]
-                step = self._step_of(answer, at)
+                came, at, result = waiting[0]
+                step = self._step_of(result, at)
                 if step.missing and not step.before_recording and self.frames < came + PATIENCE:
                     break
                 waiting.pop(0)
                 yield step
-        for _, at, answer in waiting:
-            yield self._step_of(answer, at)
+        for _, at, result in waiting:
+            yield self._step_of(result, at)
 
     def _successive_frames(self):
         last = None
@@ -297,14 +297,14 @@ class Replay:
             yield message
             self.messages_read = count
 
-    def _step_of(self, answer, at) -> ReplayedStep:
+    def _step_of(self, result, at) -> ReplayedStep:
         window = self._window
         try:
-            start, end = fields.stamp_to_ns(answer.start), fields.stamp_to_ns(answer.header.stamp)
+            start, end = fields.stamp_to_ns(result.start), fields.stamp_to_ns(result.header.stamp)
         except InvalidMessageError as error:
-            missing = f"the answer is malformed: {error}"
-            return ReplayedStep(0, answer.step, 0, 0, None, None, answer, at, missing=missing)
-        step = ReplayedStep(0, answer.step, start, end, window.get(start), window.get(end), answer, at)
+            missing = f"the result is malformed: {error}"
+            return ReplayedStep(0, result.step, 0, 0, None, None, result, at, missing=missing)
+        step = ReplayedStep(0, result.step, start, end, window.get(start), window.get(end), result, at)
         for name, stamp, frame in (("start", start, step.start_frame), ("end", end, step.end_frame)):
             if frame is None:
                 step.before_recording = window.first is not None and stamp < window.first

@@ -98,7 +98,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
     roles = {
         topic: ("", role) if role in transform_topics.ALL or role in joint_topics else tuple(role.split("/")[1:])
         for role, topic in by_role.items()
-        if role not in recorded_topics.ANSWERS and role not in described
+        if role not in recorded_topics.RESULTS and role not in described
     }
     by_transforms = any(row["input"] == topic_names.BY_TRANSFORMS for row in meshes.values())
     if not by_transforms and not of_robots and not any(kind in topic_names.POSITIONS for _, kind in roles.values()):

@@ -243,20 +243,20 @@ class Summary:
         _print_losses(replay)
         if self.before:
             print(
-                f"  {self.before} answers not verified: their step began before the recording, or depends on earlier "
+                f"  {self.before} results not verified: their step began before the recording, or depends on earlier "
                 "messages"
             )
         if self.missing:
             print(
-                f"  {replay.unverified} answers NOT VERIFIED, first step {self.missing.step} "
+                f"  {replay.unverified} results NOT VERIFIED, first step {self.missing.step} "
                 f"(ends at {self.missing.end} ns): {self.missing.missing}"
             )
         _print_distances(replay.distances)
         if replay.diverged:
             first = replay.first_divergence
             print(
-                f"DIVERGED: {replay.diverged} of {replay.diverged + replay.verified} answers differ, first in step "
-                f"{first.step}, answer {first.number} of the recording (ends at {first.end} ns):\n"
+                f"DIVERGED: {replay.diverged} of {replay.diverged + replay.verified} results differ, first in step "
+                f"{first.step}, result {first.number} of the recording (ends at {first.end} ns):\n"
                 f"  {first.difference}"
             )
         elif replay.verified:
@@ -267,11 +267,11 @@ class Summary:
             )
             # The word stands for all of the recording.
             verdict = " " if replay.distances.diverged else "VERIFIED:"
-            print(f"{verdict} {replay.verified} answers {what} ({self._tiers()})")
-        elif replay.recorded_answers and not replay.unverified and (args.begin > 0 or args.end < float("inf")):
+            print(f"{verdict} {replay.verified} results {what} ({self._tiers()})")
+        elif replay.recorded_results and not replay.unverified and (args.begin > 0 or args.end < float("inf")):
             print("NOTHING VERIFIED: no step of the recording ends between --from and --to (seconds of it)")
-        elif replay.recorded_answers:
-            print("NOTHING VERIFIED: the recording has answers, but not the frames that they belong to")
+        elif replay.recorded_results:
+            print("NOTHING VERIFIED: the recording has results, but not the frames that they belong to")
         elif self.computed:
             print("computed only: the recording has no contacts to compare with")
         else:
@@ -287,13 +287,13 @@ class Summary:
 def _print_distances(distances) -> None:
     if distances.diverged:
         print(
-            f"DIVERGED: {distances.diverged} of {distances.diverged + distances.verified} answers about distances "
+            f"DIVERGED: {distances.diverged} of {distances.diverged + distances.verified} results about distances "
             f"differ, the first:\n  {distances.first}"
         )
     elif distances.unverified:
-        print(f"  {distances.unverified} answers about distances NOT VERIFIED, the first: {distances.first}")
+        print(f"  {distances.unverified} results about distances NOT VERIFIED, the first: {distances.first}")
     elif distances.verified:
-        print(f"  {distances.verified} answers about distances are equal, points included")
+        print(f"  {distances.verified} results about distances are equal, points included")
 
 
 def _print_losses(replay) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Play a scene over DDS, as a simulation would stream it, and wait for the node's answers where that is asked for."""
+"""Play a scene over DDS, as a simulation would stream it, and wait for the node's results where that is asked for."""
 
 from __future__ import annotations
 
@@ -43,24 +43,24 @@ def publish(
     ros_args: list[str] | None = None,
     progress: bool = False,
     subscribers: int = 1,
-    answered: bool = False,
+    await_results: bool = False,
 ) -> int:
     """Publish all frames at `rate` Hz (over and over if `loop`); return how many. SIGINT and SIGTERM end it.
 
     Before the first frame, waits up to `wait` seconds until every mesh's vertices and every robot's joint states have
     `subscribers`; before what moves, until these have acknowledged what does not; before the second frame, the first.
-    answered: no frame before all have the one before and the node has answered its step, each awaited up to `wait`
-    seconds: where the machine is too slow for `rate`, the scene plays slower and nothing is dropped.
+    await_results: no frame before all have the one before and the node has processed its step, each awaited up to
+    `wait` seconds: where the machine is too slow for `rate`, the scene plays slower and nothing is dropped.
     """
     with stop_signals.collected() as stop:
         environment.prepare()
         rclpy.init(args=["--ros-args", *ros_args] if ros_args else None, signal_handler_options=SignalHandlerOptions.NO)
         node = rclpy.create_node("hpccd_scene", start_parameter_services=False)
-        answers = Answers(node) if answered else None
+        results = Results(node) if await_results else None
         try:
             publishers, listened = {}, {}
             for topic in messages.topics(scene):
-                stream = AWAITED if answered else STREAM
+                stream = AWAITED if await_results else STREAM
                 publisher = node.create_publisher(
                     message_class(topic.type_name), topic.name, qos.TOPOLOGY if topic.latched else stream
                 )
@@ -70,20 +70,20 @@ def publish(
             if await_subscribers(listened, subscribers, wait, stop) and not stop:
                 text = f"not every mesh or robot has {subscribers} subscriber(s) yet: publishing all the same"
                 print(text, file=sys.stderr, flush=True)
-            if answers is not None and not answers.await_node(wait, stop) and not stop:
+            if results is not None and not results.await_node(wait, stop) and not stop:
                 print("no node publishes contacts: publishing all the same", file=sys.stderr, flush=True)
-            count = _play(node, scene, publishers, answers, rate, loop, wait, stop, progress)
+            count = _play(node, scene, publishers, results, rate, loop, wait, stop, progress)
             # What is still on its way must not be cut off by the end of this process.
             await_acknowledged(publishers.values(), LAST)
             return count
         finally:
-            if answers is not None:
-                answers.close()
+            if results is not None:
+                results.close()
             node.destroy_node()
             rclpy.try_shutdown()
 
 
-def _play(node, scene, publishers, answers, rate, loop, wait, stop, progress) -> int:
+def _play(node, scene, publishers, results, rate, loop, wait, stop, progress) -> int:
     player = Player(scene)
     first_moving = messages.first_moving(scene)
     begin_ns, begin = node.get_clock().now().nanoseconds, time.monotonic()
@@ -106,30 +106,30 @@ def _play(node, scene, publishers, answers, rate, loop, wait, stop, progress) ->
             if count == 0:
                 begin += await_acknowledged(publishers.values(), wait, stop)
             count += 1
-            if answers is not None:
-                answers = _await_answer(answers, publishers, frame, stamp, wait, stop)
+            if results is not None:
+                results = _await_result(results, publishers, frame, stamp, wait, stop)
                 # What was waited is not made up for: frames that follow at once would wait for each other.
                 begin = max(begin, time.monotonic() - count / rate)
     return count
 
 
-def _await_answer(answers, publishers, frame, stamp, wait, stop):
-    """Wait until all have the frame and its step is answered; returns `answers`, or None to wait no more."""
+def _await_result(results, publishers, frame, stamp, wait, stop):
+    """Wait until all have the frame and its step is processed; returns `results`, or None to wait no more."""
     await_acknowledged(publishers.values(), wait, stop)
     # The first frame, and the first with another topology, only begins the next step.
-    if frame.index == 0 or frame.topologies or answers.await_step(stamp, wait, stop) or stop:
-        return answers
-    print(f"frame {frame.index} is not answered in {wait:g} s: publishing by the clock", file=sys.stderr, flush=True)
+    if frame.index == 0 or frame.topologies or results.await_step(stamp, wait, stop) or stop:
+        return results
+    print(f"frame {frame.index} is not processed in {wait:g} s: publishing by the clock", file=sys.stderr, flush=True)
     return None
 
 
 def _sleep_until(instant, stop) -> None:
-    # In short pieces: a sleep goes on after a signal, and at a low rate Ctrl-C would be answered late.
+    # In short pieces: a sleep goes on after a signal, and at a low rate Ctrl-C would take effect late.
     while not stop and (left := instant - time.monotonic()) > 0:
         time.sleep(min(left, 0.1))
 
 
-class Answers:
+class Results:
     """Listens to `contacts` through `node`. Make it before the publishers: the node then knows this listener before
     it has the first frame."""
 
@@ -150,7 +150,7 @@ class Answers:
         return self._spin_until(lambda: self._subscription.get_publisher_count() > 0, wait, stop)
 
     def await_step(self, stamp: int, wait: float, stop: Sequence = ()) -> bool:
-        """Wait until the step that ends at `stamp` (ns), or a later one, is answered; like `await_node`."""
+        """Wait until the step that ends at `stamp` (ns), or a later one, is processed; like `await_node`."""
         return self._spin_until(lambda: self._stamp >= stamp, wait, stop)
 
     def _spin_until(self, ready, wait, stop) -> bool:

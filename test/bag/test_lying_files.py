@@ -98,7 +98,7 @@ def test_topics_cannot_write_to_the_terminal(bag, tmp_path):
     assert "\x1b" not in done.out and r"/x\x1b[2J\n" in done.out
 
 
-def test_a_topic_without_a_name_is_not_that_of_the_answers(bag, tmp_path):
+def test_a_topic_without_a_name_is_not_that_of_the_results(bag, tmp_path):
     bag.channel("/contacts").topic = ""
     replayed = hpccd("replay", bag.write(tmp_path / "x.mcap"))
     assert replayed.status == 0 and "VERIFIED:" not in replayed.out
@@ -124,7 +124,7 @@ def _first(records, kind):
 
 
 def test_an_index_that_leaves_a_chunk_out(bag, tmp_path):
-    """The answers in that chunk would not be verified, in silence."""
+    """The results in that chunk would not be verified, in silence."""
 
     def change(records):
         left_out = _first(records, ChunkIndex)
@@ -155,7 +155,7 @@ def test_an_index_that_leaves_a_topic_out(bag, tmp_path):
 
 
 def test_an_index_that_tells_of_fewer_messages(bag, tmp_path):
-    """Without its answers a recording is only computed."""
+    """Without its results a recording is only computed."""
     contacts = bag.channel("/contacts").id
 
     def change(records):

@@ -173,7 +173,7 @@ def test_what_has_to_be_unpacked_first(sound_bags, tmp_path, whole):
     else:
         subprocess.run(command, shell=True, check=True)
     done = hpccd("replay", folder, "--params", tmp_path / "parameters.yaml")
-    assert done.status == 0 and "VERIFIED: 7 answers" in done.out, done
+    assert done.status == 0 and "VERIFIED: 7 results" in done.out, done
 
 
 @pytest.mark.parametrize("mode", [None, CompressionMode.FILE], ids=str)
@@ -193,7 +193,7 @@ def test_sqlite3_is_named_with_the_command_that_converts(sound_bags, tmp_path, m
     subprocess.run([*convert, "--src", folder, "--dst", f"{folder}-mcap"], check=True)
     (tmp_path / "parameters.yaml").write_text(PARAMETERS)
     done = hpccd("replay", f"{folder}-mcap", "--params", tmp_path / "parameters.yaml")
-    assert done.status == 0 and "VERIFIED: 7 answers" in done.out, done
+    assert done.status == 0 and "VERIFIED: 7 results" in done.out, done
 
 
 def test_recordings_without_a_message_of_ros_2(bag, tmp_path):
@@ -238,7 +238,7 @@ def _check(path, expected, skipped=(), options=()):
         assert counts == {topic: [row[0] for row in expected].count(topic) for topic in {row[0] for row in expected}}
     examined, replayed = hpccd("doctor", path), hpccd("replay", path, *options)
     assert examined.status == 0 and ": sound" in examined.out, examined
-    assert replayed.status == 0 and "VERIFIED: 7 answers" in replayed.out, replayed
+    assert replayed.status == 0 and "VERIFIED: 7 results" in replayed.out, replayed
     for words in (examined.out, replayed.err):
         assert ("skipped, because these are not ROS 2 messages" in words) == bool(skipped), words
         assert all(f"{topic} (" in words for topic in skipped), words

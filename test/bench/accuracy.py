@@ -90,7 +90,7 @@ def _check(report):
 
 
 def _show_sweeps(rows, tiers):
-    """Hard queries; and for each sweep the share of wrong answers."""
+    """Hard queries; and for each sweep the share of wrong results."""
     lines: dict = {}
     for row in rows:
         if row["part"] in ("adversarial", "sweep"):
@@ -105,4 +105,4 @@ def _show_sweeps(rows, tiers):
     for name in ("scale", "offset"):
         mine = [line for line in lines.values() if line.get("sweep") == name]
         columns = {name: lambda row: f"{row['at']:g}", "queries": "queries", **of}
-        lab.show(f"share of wrong answers against {name}", columns, mine)
+        lab.show(f"share of wrong results against {name}", columns, mine)

@@ -20,7 +20,7 @@ from hpccd_ros.bench import report as tables
 from hpccd_ros.bench.sources import Source, Step, of_npz
 
 QUESTIONS = (SEPARATION, PROXIMITY, INTERSECTIONS)
-# Keys of a file of truth: which queries it answers, and the name of their value.
+# Keys of a file of truth: which queries it covers, and the name of their value.
 KEYS = dict.fromkeys(("s", "s2", "s3"), ("separation", "toc"))
 KEYS |= dict.fromkeys(("p", "p2"), ("proximity", "distance")) | {"x": ("intersections", "")}
 SINGLE = "queries.npz"
@@ -42,7 +42,7 @@ def scenes(folder: Path) -> list[tuple[Source, dict[str, np.ndarray]]]:
 
 
 def on_scene(source: Source, known: dict, variants: dict[str, dict], rounds: int) -> Iterator[dict]:
-    """Rows {"scene", "query", "distance", "variant", ...}: each query that the truth answers, for each detector's
+    """Rows {"scene", "query", "distance", "variant", ...}: each query that the truth covers, for each detector's
     options, timed in turn."""
     step = source.step(0)
     for key, (query, value) in KEYS.items():

@@ -64,14 +64,14 @@ def _queries(kind, family, n, seed):
     return GENERATORS[kind]["meeting"](rng, n)
 
 
-def ask(batches: list[Batch], tiers: list[str], known: list[questions.Answers] | None = None) -> Iterator[dict]:
+def ask(batches: list[Batch], tiers: list[str], known: list[questions.Results] | None = None) -> Iterator[dict]:
     """A row for each tier, of all batches together; `known`: the truth of each batch, by default the oracle's."""
     true = known or [questions.truth(batch) for batch in batches]
     sizes = np.concatenate([questions.size_of(batch) for batch in batches])
     for tier in tiers:
-        answers = [questions.answers(batch, tier, "auto") for batch in batches]
+        results = [questions.results(batch, tier, "auto") for batch in batches]
         parts = [
-            np.concatenate(part) for part in zip(*((*a, *t) for a, t in zip(answers, true, strict=True)), strict=True)
+            np.concatenate(part) for part in zip(*((*a, *t) for a, t in zip(results, true, strict=True)), strict=True)
         ]
         hit, toc, true_hit, true_toc = parts
         both, wrong = hit & true_hit, ((true_hit, true_hit & ~hit, hit & ~true_hit))

@@ -46,7 +46,7 @@ COLUMNS = {
 
 
 class Gaps(list):
-    """Smallest distances, with a hash to compare calls by, as the other answers have one."""
+    """Smallest distances, with a hash to compare calls by, as the other results have one."""
 
     @property
     def hash(self) -> int:
@@ -122,7 +122,7 @@ def _rows(result, args, source, runners, asked, edge):
     for question in asked:
         one, peer = series[question.name], series.get(f"ipctk {question.name}")
         for text in measure.disagreements({question.name: one}):
-            result.failure(f"{source.name}: {question.name}: answers differ between calls: {text}")
+            result.failure(f"{source.name}: {question.name}: results differ between calls: {text}")
         row = one.row()
         row |= {"pairs": row.pop("contacts"), "query": question.query, "distance": question.distance}
         for key, of in (("over_plain", "step_ms"), ("least_over_plain", "least_ms")):

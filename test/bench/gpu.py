@@ -111,7 +111,7 @@ class StagesDetector(hc.Detector):
 
 
 def call_times(ask: Callable, repeat: int):
-    """(times of ask(), its last answer) after a warm-up; rounds end early where they take long."""
+    """(times of ask(), its last result) after a warm-up; rounds end early where they take long."""
     began = time.perf_counter()
     for _ in range(WARM_UP):
         found = ask()

@@ -123,7 +123,7 @@ def slope(x: Sequence[float], y: Sequence[float]) -> float:
 
 
 def in_turn(what: str, ways: dict[str, Callable], rounds: int) -> tuple[dict[str, list[float]], dict]:
-    """ms of each call by way, all ways in turn in each round after one of warm-up; and their last answers."""
+    """ms of each call by way, all ways in turn in each round after one of warm-up; and their last results."""
     ms, found = {way: [] for way in ways}, {}
     with bar(what, (rounds + 1) * len(ways)) as done:
         for turn in range(rounds + 1):

@@ -89,7 +89,7 @@ def _whole_scenes(rows: list[dict]) -> list[dict]:
     return [{**line, "wrong": wrong(only(scene=line["scene"])(rows))} for line in by("scene", "accuracy")(rows)]
 
 
-def _wrong_answers(rows: list[dict]) -> list[dict]:
+def _wrong_results(rows: list[dict]) -> list[dict]:
     kinds = {
         "ordinary, scale 1e-150 to 1e148, offset to 1e12": only(queries="ordinary"),
         "degenerate, the same": only(queries="degenerate"),
@@ -223,8 +223,8 @@ TABLES = {
     ),
     "robot": Table(
         ("robot-2-cores", "robot-4-of-16-cores", "robot-h100-4-of-16-cores"),
-        {"cores": "cores", "core on": "backend", "results": "answers", "dropped": "dropped"}
-        | _to(1, results_per_second="answers_hz")
+        {"cores": "cores", "core on": "backend", "results": "results", "dropped": "dropped"}
+        | _to(1, results_per_second="results_hz")
         | {
             f"{name}, ms: median / p95": joined(f"{part}_median_ms", f"{part}_p95_ms", digits=2, between=" / ")
             for name, part in (("frame to result", "whole"), ("detection", "detection"), ("core", "core"))
@@ -238,10 +238,10 @@ TABLES = {
         | {"false negatives + false positives": "wrong"},
         _whole_scenes,
     ),
-    "wrong-answers": Table(
+    "wrong-results": Table(
         ("accuracy-4-cores", "accuracy-distance-2-cores"),
         {"queries: false negatives + false positives": "kind", "of": "of"} | {f"`{tier}`": tier for tier in TIERS},
-        _wrong_answers,
+        _wrong_results,
     ),
     "options": Table(
         ("options-2-cores",),

@@ -22,8 +22,8 @@ from __future__ import annotations
 
 import numpy as np
 from oracle import rigid_tightness
-from oracle.rigid_answers import Verdict, ask, judge
 from oracle.rigid_queries import KINDS, MOTIONS, random_queries
+from oracle.rigid_results import Verdict, ask, judge
 
 from bench import lab, rigid_cost
 from hpccd_ros.base.errors import UserError
@@ -102,10 +102,10 @@ def _truth(report, args):
                 for batch, begin in enumerate(range(0, each, _BATCH)):
                     rng = np.random.default_rng([args.seed, m, k, batch])
                     queries = random_queries(rng, min(_BATCH, each - begin), kind, motion)
-                    answers = ask(queries)
-                    verdicts.append(judge(queries, answers))
-                    seconds += answers.seconds
-                    parts += float(answers.parts.sum())
+                    results = ask(queries)
+                    verdicts.append(judge(queries, results))
+                    seconds += results.seconds
+                    parts += float(results.parts.sum())
                     done()
                 row = report.add(
                     part="truth",

@@ -29,9 +29,9 @@ from hpccd_ros.scenes import messages
 
 SCENE = "arm-and-cloth"
 PATIENCE = 60.0  # s
-SETTLE = 1.0  # s, until the last answers have come
+SETTLE = 1.0  # s, until the last results have come
 PARTS = ("whole", "detection", "core", "around", "added")
-COLUMNS = {"answers": "answers", "a second": "answers_hz", "dropped": "dropped"}
+COLUMNS = {"results": "results", "a second": "results_hz", "dropped": "dropped"}
 COLUMNS |= dds.columns(**{part: part for part in PARTS})
 
 
@@ -56,7 +56,7 @@ def run(args) -> lab.Report:
         if row["unaccounted"]:
             report.failure(f"{row['unaccounted']} frames are not accounted for")
     lab.show(
-        f"{SCENE} at {args.rate:g} frames a second: ms from before a frame is sent to its answer",
+        f"{SCENE} at {args.rate:g} frames a second: ms from before a frame is sent to its result",
         COLUMNS,
         report.rows,
         "detection: with joints, bounds and cuts; core: its calls alone; around: whole less detection; added: "
@@ -76,7 +76,7 @@ def _measured(args, scene) -> dict:
         def take(data: bytes) -> None:
             came.append((time.monotonic(), data))
 
-        # Raw: to read the answers while frames are sent would delay these.
+        # Raw: to read the results while frames are sent would delay these.
         session.node.create_subscription(ContactArray, topic_names.CONTACTS, take, qos.keep_last(args.frames), raw=True)
         threading.Thread(target=session.executor.spin, daemon=True).start()
         sent = _sent(session, scene, args.rate, status)
@@ -87,17 +87,17 @@ def _measured(args, scene) -> dict:
         if session.children.end(child) != 0:
             session.children.check()
         times = session.times()
-    answers = [(at, deserialize_message(data, ContactArray)) for at, data in came]
-    if len(answers) < 2:
-        raise lab.UserError("the node answered nothing")
-    whole = 1e3 * np.array([at - sent[message.step] for at, message in answers])
-    detection, core = np.array([times[message.step][3:5] for _, message in answers]).T
+    results = [(at, deserialize_message(data, ContactArray)) for at, data in came]
+    if len(results) < 2:
+        raise lab.UserError("the node sent no results")
+    whole = 1e3 * np.array([at - sent[message.step] for at, message in results])
+    detection, core = np.array([times[message.step][3:5] for _, message in results]).T
     parts = zip(PARTS, (whole, detection, core, whole - detection, whole - core), strict=True)
     return {
-        "answers": len(answers),
-        "answers_hz": (len(answers) - 1) / (came[-1][0] - came[0][0]),
-        "contacts": float(np.median([message.total for _, message in answers])),
-        "parts": int(max(message.parts for _, message in answers)),
+        "results": len(results),
+        "results_hz": (len(results) - 1) / (came[-1][0] - came[0][0]),
+        "contacts": float(np.median([message.total for _, message in results])),
+        "parts": int(max(message.parts for _, message in results)),
         **{key: ms for part, of in parts for key, ms in dds.percentiles(f"{part}_", of).items()},
         **counted,
         "frames": args.frames,

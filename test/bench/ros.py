@@ -38,14 +38,14 @@ from hpccd_ros.middleware import contact_messages, fields, mesh_messages, qos, s
 NAMESPACE, MESH = "/bench", "scene"
 LARGE, SMALL = "cloth-ball", "cloth-drop"
 # The echo keeps the last two for a late joiner: those of even and of odd steps.
-ANSWERS = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+RESULTS = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PARTS_OF_MOTION = (1.0, 0.5, 0.25, 0.75)  # trial steps from each start: what a line search asks
 SETTLE = 10.0  # s for the last diagnostics to come
 TRIAL = 3.0  # s of a trial in the search of the sustained rate
 FINER = 1.1  # ratio of the rates that the search tries
 IN, OUT = {"scene": "scene", "MB in": "mb_in", "MB out": "mb_out", "contacts": "contacts"}, {"node / echo": "ratio"}
 LATENCY = IN | {"core median": "core_median_ms"} | dds.columns(node="node", echo="echo") | OUT
-PARTS = ("in", "hand over", "answer", "out")
+PARTS = ("in", "hand over", "result", "out")
 LOOP = {"scene": "scene", "MB sent": "mb_sent"}
 LOOP |= dds.columns(**{"over DDS": "loop", "in process": "core", "DDS more": "more"})
 RATES = {"scene": "scene", "run": "what", "Hz": "rate_hz", **{k: k for k in ("sent", "answered", "dropped")}}
@@ -123,7 +123,7 @@ def _measure(report, args, name, step) -> None:
         if found["unaccounted"]:
             report.failure(f"{name}, {what}: {found['unaccounted']} frames are not accounted for")
         if not found["last_answered"]:
-            report.failure(f"{name}, {what}: the last frame was not answered")
+            report.failure(f"{name}, {what}: the last frame has no result")
     if loop["wrong"]:
         report.failure(f"{name}: {loop['wrong']} collision-free steps of ~/detect differ from the core's own")
     if latency["ratio"] > args.limit:
@@ -132,7 +132,7 @@ def _measure(report, args, name, step) -> None:
 
 
 class Lane:
-    """One way to an answer. sent, came: time of each step, s of CLOCK_MONOTONIC; position: which was sent."""
+    """One way to a result. sent, came: time of each step, s of CLOCK_MONOTONIC; position: which was sent."""
 
     def __init__(self, name: str, publisher):
         self.name, self.publisher, self.step = name, publisher, 0
@@ -141,7 +141,7 @@ class Lane:
         self.came: dict[int, float] = {}
 
     def latencies_ms(self) -> np.ndarray:
-        """From before the call of publish() to the begin of the callback, of the steps that were answered."""
+        """From before the call of publish() to the begin of the callback, of the steps that were processed."""
         return np.array([1e3 * (at - self.sent[step]) for step, at in self.came.items()])
 
     def clear(self) -> None:
@@ -170,20 +170,20 @@ class Link:
         found = [self.detector.detect(positions[1 - k], positions[k]) for k in (0, 1)]
         self._expected, self.contacts = [contacts.hash for contacts in found], len(found[1])
         layout = Layout.of((MESH,), (Topology(0, self.n_vertices, faces),))
-        self._answers = [ContactArray(step=parity) for parity in (0, 1)]
-        for answer, contacts in zip(self._answers, found, strict=True):
-            contact_messages.fill_contacts(answer, contacts, layout)
+        self._results = [ContactArray(step=parity) for parity in (0, 1)]
+        for result, contacts in zip(self._results, found, strict=True):
+            contact_messages.fill_contacts(result, contacts, layout)
         arrays = ("kind", "mesh_a", "mesh_b", "features_a", "features_b", "toc", "points", "normals")
-        arrays = [getattr(self._answers[1], array) for array in arrays]
+        arrays = [getattr(self._results[1], array) for array in arrays]
         self.bytes_out = sum(len(values) * values.itemsize for values in arrays)
         self.hold = 1
         self.wrong: list[int] = []
         reliable = qos.vertices("reliable", 10)
         self._topology = node.create_publisher(MeshTopology, topic_names.topology(MESH), qos.TOPOLOGY)
-        self._templates = node.create_publisher(ContactArray, "echo/answers", ANSWERS)
+        self._templates = node.create_publisher(ContactArray, "echo/results", RESULTS)
         self.node = Lane("node", node.create_publisher(MeshVertices, topic_names.vertices(MESH), reliable))
         self.echo = Lane("echo", node.create_publisher(MeshVertices, "echo/vertices", reliable))
-        # A benchmark must hear every answer: deeper than the node's own QoS, which a late reader overruns.
+        # A benchmark must hear every result: deeper than the node's own QoS, which a late reader overruns.
         deep = qos.vertices("reliable", 100)
         node.create_subscription(ContactArray, topic_names.CONTACTS, self._from(self.node), deep)
         node.create_subscription(ContactArray, "echo/contacts", self._from(self.echo), deep)
@@ -203,15 +203,15 @@ class Link:
         publishers = (self._topology, self._templates, self.node.publisher, self.echo.publisher)
         self.session.spin_until(lambda: all(p.get_subscription_count() for p in publishers), "node and echo")
         self._topology.publish(mesh_messages.topology_message(self._faces, self.n_vertices))
-        for answer in self._answers:
-            self._templates.publish(answer)
+        for result in self._results:
+            self._templates.publish(result)
         deadline = time.monotonic() + dds.PATIENCE
-        # Nothing tells when a latched message has arrived, so ask until there is an answer.
+        # Nothing tells when a latched message has arrived, so ask until there is a result.
         for lane in (self.node, self.echo):
             while not lane.came:
                 self.session.children.check()
                 if time.monotonic() > deadline:
-                    raise lab.UserError(f"the {lane.name} did not answer within {dds.PATIENCE:.0f} s")
+                    raise lab.UserError(f"the {lane.name} did not respond within {dds.PATIENCE:.0f} s")
                 self.publish(lane)
                 self.session.spin(0.2)
 
@@ -227,12 +227,12 @@ class Link:
         return lane.step
 
     def round(self, lane: Lane) -> None:
-        """Send one frame and wait for its answer."""
+        """Send one frame and wait for its result."""
         step = self.publish(lane)
         deadline = time.monotonic() + dds.PATIENCE
         while step not in lane.came:
             if time.monotonic() > deadline:
-                raise lab.UserError(f"the {lane.name} did not answer step {step} within {dds.PATIENCE:.0f} s")
+                raise lab.UserError(f"the {lane.name} returned no result for step {step} within {dds.PATIENCE:.0f} s")
             self.session.executor.spin_once(timeout_sec=1.0)
 
 
@@ -268,7 +268,7 @@ def _latency(row: dict, lanes: dict, times: dict) -> dict:
 
 
 def _step_loop(link: Link, scene: str, rounds: int) -> dict:
-    """Percentiles of the node's and the core's time of the same trial steps, in turn; `wrong` answers are counted."""
+    """Percentiles of the node's and the core's time of the same trial steps, in turn; `wrong` results are counted."""
     service = link.session.node.create_client(Detect, "hpccd/detect")
     link.session.spin_until(service.service_is_ready, "service")
     ends = (link.positions, link.positions[::-1])
@@ -279,7 +279,7 @@ def _step_loop(link: Link, scene: str, rounds: int) -> dict:
             began = time.perf_counter()
             future = service.call_async(client.collision_free_step_request({MESH: start}, {MESH: end}))
             sent = time.perf_counter()
-            link.session.spin_until(future.done, "answer of ~/detect")
+            link.session.spin_until(future.done, "result of ~/detect")
             step = client.collision_free_step_from_response(future.result())
             came = time.perf_counter()
             wrong += step != link.detector.collision_free_step(start, end)
@@ -345,11 +345,11 @@ def _trial(link: Link, status: dds.NodeStatus, pid: int, rate: float, seconds: f
     return {
         "rate_hz": count / took,
         "sent": count,
-        "answered": after["answered"],
+        "answered": after["processed"],
         "dropped": after["dropped"] - after["middleware"],
         "middleware": after["middleware"],
         # What the node never heard of at the end of a burst leaves no gap in its numbers: it must be missing here.
-        "unaccounted": count - after["answered"] - after["dropped"],
+        "unaccounted": count - after["processed"] - after["dropped"],
         "last_answered": lane.step in lane.came,
         **dds.percentiles("", lane.latencies_ms()),
         **{"memory_begin_mb": first, "memory_end_mb": last, "memory_most_mb": max(memory)},
@@ -371,18 +371,18 @@ def _settle(link: Link, status: dds.NodeStatus) -> None:
 
 
 def echo(namespace: str) -> None:
-    """The bare cost of ROS: answers each vertex message at once with contacts that it was given before."""
-    stop, answers = Future(), {}
+    """The bare cost of ROS: responds to each vertex message at once with contacts that it was given before."""
+    stop, results = Future(), {}
     with dds.helper("echo", namespace, lambda: stop.set_result(None)) as node:
         contacts = node.create_publisher(ContactArray, "echo/contacts", qos.CONTACTS)
 
         def take(message: MeshVertices) -> None:
-            answer = answers.get(message.step % 2)
-            if answer is not None:
-                answer.header.stamp, answer.step = message.header.stamp, message.step
-                contacts.publish(answer)
+            result = results.get(message.step % 2)
+            if result is not None:
+                result.header.stamp, result.step = message.header.stamp, message.step
+                contacts.publish(result)
 
-        node.create_subscription(ContactArray, "echo/answers", lambda m: answers.update({m.step % 2: m}), ANSWERS)
+        node.create_subscription(ContactArray, "echo/results", lambda m: results.update({m.step % 2: m}), RESULTS)
         node.create_subscription(MeshVertices, "echo/vertices", take, qos.vertices("reliable", 10))
         executor = SingleThreadedExecutor()
         executor.add_node(node)

@@ -44,7 +44,7 @@ SCENE, SIZE = "breaking-like", 0.02  # 5,036 triangles; sixteen changes of topol
 TIER = "balanced"
 INPUT_DEPTH = 50  # frames that may wait for the node
 HELD_UP_FRAMES = INPUT_DEPTH + 10  # more than may wait
-HISTORY = 10_000  # frames that an answer may name: what a busy machine holds up comes late
+HISTORY = 10_000  # frames that a result may name: what a busy machine holds up comes late
 WRONG_EVERY, REQUEST_EVERY, UNKNOWN_EVERY = 7, 20, 50  # frames
 QUERIES = ("contacts", "collision_free_step")  # of requests, in turn
 SEGMENT = 16 << 20  # bytes of shared memory that a publisher has (config/fastdds*.xml)
@@ -64,7 +64,7 @@ def configure(parser):
     add("--restart-every", 12.0, "S", "life of the publisher that is restarted, s, on average")
     add("--warm-up", 0.25, "X", "share of the time before memory counts")
     add("--memory-limit", 1.0, "PERCENT", "largest change of resident memory")
-    add("--check-every", 25, "N", "compute every Nth answer again")
+    add("--check-every", 25, "N", "compute every Nth result again")
     add("--seed", 0, "N", "of what is random")
     lab.configure(parser, leave_out=("data", "size", "threads", "repeat"))
 
@@ -94,11 +94,11 @@ def run(args) -> lab.Report:
 
 
 class Load:
-    """Publishes every mesh but the strip, in a node of this process, and checks answers and replies.
+    """Publishes every mesh but the strip, in a node of this process, and checks results and replies.
 
     sent: vertex messages by mesh, wrong ones included. victim: the mesh that wrong messages are sent for. wrong_sent,
-    topologies_wrong: by the reason by which the node must count them. counts: of answers heard, of these computed again
-    (checked), of changes of topology, requests and replies. wrong: texts of answers that were not as they must be.
+    topologies_wrong: by the reason by which the node must count them. counts: of results heard, of these computed again
+    (checked), of changes of topology, requests and replies. wrong: texts of results that were not as they must be.
     """
 
     def __init__(self, node, args):
@@ -123,7 +123,7 @@ class Load:
         self.sent: Counter = Counter()
         self.wrong_sent: Counter = Counter()
         self.topologies_wrong: Counter = Counter()
-        self.counts = dict.fromkeys(("answers", "checked", "topologies", "requests", "replies"), 0)
+        self.counts = dict.fromkeys(("results", "checked", "topologies", "requests", "replies"), 0)
         self.wrong: list[str] = []
         self.victim = self._scene.mesh_names[0]
 
@@ -264,15 +264,15 @@ class Load:
         self.open = [request for request in self.open if not request[0].done()]
 
     def _on_contacts(self, message: ContactArray) -> None:
-        self.counts["answers"] += 1
-        if self.counts["answers"] % self._args.check_every:
+        self.counts["results"] += 1
+        if self.counts["results"] % self._args.check_every:
             return
         start, end = (self._frames.get(fields.stamp_to_ns(s)) for s in (message.start, message.header.stamp))
         if start is None or end is None:
-            self.wrong.append(f"an answer for step {message.step} names a time that was not sent, or long ago")
+            self.wrong.append(f"a result for step {message.step} names a time that was not sent, or long ago")
             return
         if start[0] != end[0]:
-            self.wrong.append(f"the answer for step {message.step} spans a change of topology")
+            self.wrong.append(f"the result for step {message.step} spans a change of topology")
             return
         meshes = (*self._scene.meshes, *self._strip.meshes)
         faces = (*self._scene.faces(end[1]), *self._strip.faces())
@@ -286,7 +286,7 @@ class Load:
         self.counts["checked"] += 1
         if message.hash != expected.hash or message.total != len(expected):
             self.wrong.append(
-                f"the answer for step {message.step}, {message.start} to {message.header.stamp}, has {message.total} "
+                f"the result for step {message.step}, {message.start} to {message.header.stamp}, has {message.total} "
                 f"contacts and hash {message.hash:#x}, the core alone finds {len(expected)} and {expected.hash:#x}"
             )
 
@@ -381,7 +381,7 @@ class Soak:
                     row |= {
                         key: len(list((of / key2).iterdir())) for key, key2 in (("threads", "task"), ("files", "fd"))
                     }
-                    self._report.add(**row, answers=self.load.counts["answers"], **self.status.counts())
+                    self._report.add(**row, results=self.load.counts["results"], **self.status.counts())
         process.send_signal(signal.SIGCONT)
         return tick
 
@@ -413,7 +413,7 @@ class Soak:
         for text in load.wrong[:10]:
             failure(text)
         if not load.counts["checked"]:
-            failure("no answer was computed again: the time was too short to say anything of them")
+            failure("no result was computed again: the time was too short to say anything of them")
         for mesh, sent in load.sent.items():
             if missing := sent - self.received(mesh):
                 failure(f"{mesh}: {missing} messages were sent, but neither received nor counted as lost")

@@ -45,7 +45,7 @@ COLUMNS = {
 
 
 class Free(float):
-    """How far a step may go, with the length and the hash that other answers have."""
+    """How far a step may go, with the length and the hash that other results have."""
 
     def __len__(self) -> int:
         return int(self < 1)
@@ -145,7 +145,7 @@ def trials(step: Step) -> list[Step]:
 
 def contradictions(runners: list[StepRunner], accuracy: str) -> list[str]:
     """Where calls of one query, or the earliest times of several, do not agree, in words."""
-    texts = [f"{r.name}: answers differ between calls" for r in runners if any(len(h) > 1 for h in r.hashes.values())]
+    texts = [f"{r.name}: results differ between calls" for r in runners if any(len(h) > 1 for h in r.hashes.values())]
     early = 1e-9 if accuracy in ("exact", "conservative") else 0.0
     times = {runner.name: runner.earliest for runner in runners}
     for query in (FIRST, STEP):

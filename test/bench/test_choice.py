@@ -90,7 +90,7 @@ class Found:
         return len(self.vf)
 
 
-def test_wrong_answers_count_against_what_is_asked():
+def test_wrong_results_count_against_what_is_asked():
     every, first, any_, faces, edges = ASKED
     true = vars(Found([[0, 1], [2, 3]], [0.25, 0.5]))
     true = {key: true[key] for key in ("vf", "vf_toc", "ee", "ee_toc")}

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import oracle
 import pytest
-from oracle import rigid_answers
+from oracle import rigid_results
 
 import hpccd_core as hc
 from bench import distance, page, step
@@ -126,7 +126,7 @@ def test_solved_cloth_is_a_source(bench):
     assert status == 0 and result["rows"][0]["contacts"] > 0
 
 
-def test_worlds_whose_answers_differ_fail(bench, monkeypatch):
+def test_worlds_whose_results_differ_fail(bench, monkeypatch):
     detect, calls = hc.Detector.detect, collections.Counter()
 
     def from_the_second_call_on(self, *args, **options):
@@ -139,7 +139,7 @@ def test_worlds_whose_answers_differ_fail(bench, monkeypatch):
 
 
 def test_missed_motions_of_poses_fail(bench, monkeypatch):
-    monkeypatch.setattr(rigid_answers, "grown", lambda d, a, b: d)
+    monkeypatch.setattr(rigid_results, "grown", lambda d, a, b: d)
     status, result, _ = bench("rigid", "--parts", "truth", "--queries", "400")
     assert status == 1 and any("missed" in text for text in result["failures"])
 

@@ -22,7 +22,7 @@ request = Detect.Request(
 )
 future = service.call_async(request)
 rclpy.spin_until_future_complete(node, future)
-answer = future.result()
-print(answer.success, answer.message)
-near = client.contacts_from_message(answer.contacts)
+response = future.result()
+print(response.success, response.message)
+near = client.contacts_from_message(response.contacts)
 print(near.distance, near.features_a, near.features_b)  # vertex 0 of the hand, face 0 of the table

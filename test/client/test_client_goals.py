@@ -37,5 +37,5 @@ def test_only_requests_become_goals(other):
 def test_the_step_in_a_result():
     assert client.collision_free_step_from_response(DetectAction.Result(success=True, collision_free_step=0.25)) == 0.25
     aborted = DetectAction.Result(success=False, message="busy: try again later", collision_free_step=1.0)
-    with pytest.raises(RuntimeError, match="the node did not answer: busy"):
+    with pytest.raises(RuntimeError, match="the node computed nothing: busy"):
         client.collision_free_step_from_response(aborted)

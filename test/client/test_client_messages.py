@@ -138,7 +138,7 @@ def test_contacts_tell_what_was_tested():
     assert client.contacts_from_message(two_contacts(tested_features=2)).features == ("edge_edge",)
 
 
-def test_answers_of_one_snapshot():
+def test_responses_of_one_snapshot():
     near = client.contacts_from_message(two_contacts(toc=[], distance=[0.5, 0.25]))
     assert (len(near), near.n_vertex_face, near.n_edge_edge, near.n_edge_face) == (2, 1, 1, 0)
     assert near.distance.tolist() == [0.5, 0.25] and len(near.toc) == 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The request that asks how far a motion may go, and its answer: what is rejected before it is sent or used."""
+"""The request that asks how far a motion may go, and its response: what is rejected before it is sent or used."""
 
 import math
 
@@ -61,18 +61,18 @@ def test_what_is_rejected_before_it_is_sent(arguments, error, text):
 
 
 @pytest.mark.parametrize("step", [0.0, 0.25, 1.0])
-def test_the_step_in_an_answer(step):
+def test_the_step_in_a_response(step):
     assert client.collision_free_step_from_response(Detect.Response(success=True, collision_free_step=step)) == step
 
 
 @pytest.mark.parametrize("step", [0.0, 1.0, math.nan])
 def test_no_step_where_the_node_computed_none(step):
     rejected = Detect.Response(success=False, message="busy: try again later", collision_free_step=step)
-    with pytest.raises(RuntimeError, match="the node did not answer: busy: try again later"):
+    with pytest.raises(RuntimeError, match="the node computed nothing: busy: try again later"):
         client.collision_free_step_from_response(rejected)
 
 
 @pytest.mark.parametrize("step", [math.nan, -0.1, 1.1, math.inf])
 def test_no_step_where_something_else_was_asked_for(step):
-    with pytest.raises(ValueError, match="it is the answer to query collision_free_step only"):
+    with pytest.raises(ValueError, match="it is the result of query collision_free_step only"):
         client.collision_free_step_from_response(Detect.Response(success=True, collision_free_step=step))

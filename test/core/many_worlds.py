@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes many times over, and how an answer for all is compared with a detector of each world."""
+"""Scenes many times over, and how a result for all is compared with a detector of each world."""
 
 import dataclasses
 
@@ -70,8 +70,8 @@ def assert_offsets(offsets, counts):
     np.testing.assert_array_equal(offsets, np.cumsum([0, *counts]))
 
 
-def hash_of(answers):
-    return sum(a.hash * (2 * k + 1) for k, a in enumerate(answers)) % 2**64
+def hash_of(results):
+    return sum(a.hash * (2 * k + 1) for k, a in enumerate(results)) % 2**64
 
 
 def assert_contacts(found, alone):

@@ -16,7 +16,7 @@ def rows(array):
 def assert_pairs(found, truth, value, accuracy="exact", size=1.0):
     """Vertex-face and edge-edge pairs with their values ("toc" or "distance"): as the accuracy promises."""
     for kind in ("vf", "ee"):
-        pairs, true_pairs = (np.asarray(getattr(answer, kind)) for answer in (found, truth))
+        pairs, true_pairs = (np.asarray(getattr(result, kind)) for result in (found, truth))
         in_order = np.lexsort(true_pairs.T[::-1])
         if not np.array_equal(pairs, true_pairs[in_order]):
             listed, true = rows(pairs), set(rows(true_pairs))

@@ -64,13 +64,13 @@ def test_detectors(mode, scale):
     meshes = random_scenes.many_meshes(np.random.default_rng(1))
     start, end, d = meshes.vertices_t0 * scale, meshes.vertices_t1 * scale, 0.125 * scale
 
-    def answers():
+    def results():
         detector = hc.Detector(meshes.scene(), threads=2, outputs=("points", "normals", "closest"), backend="cpu")
         detector.set_separation(0, 1, d)
         near, gaps = detector.proximity(start, d), detector.distances(start)
         return detector.detect(start, end), near, gaps, detector.collision_free_step(start, end)
 
-    found, expected = same(answers, MODES[mode])
+    found, expected = same(results, MODES[mode])
     assert len(expected[0]) and len(expected[1]) and found == expected
 
 
@@ -102,7 +102,7 @@ def test_lengths_of_another_type(mode):
     """Lengths become float64 before the core gets them."""
     there = np.vstack([FLAT, FLAT + [0, 0, 2e-45]])
 
-    def answers():
+    def results():
         of_options = hc.Detector(two_triangles(), minimum_separation=DENORMAL, backend="cpu")
         of_scene = two_triangles()
         of_scene.set_separation("a", "b", DENORMAL)
@@ -115,7 +115,7 @@ def test_lengths_of_another_type(mode):
         query = [there[3] + [0.2, 0.2, 0], *FLAT]
         return [*found, hc.test_vertex_face([query * 2], minimum_separation=DENORMAL)[0].tolist()]
 
-    found, expected = same(answers, MODES[mode])
+    found, expected = same(results, MODES[mode])
     assert all(expected) and found == expected
 
 
@@ -135,7 +135,7 @@ def test_equality(mode):
     contacts = hc.Detector(two_triangles(), backend="cpu", outputs=("closest",)).detect(*[np.vstack([FLAT, FLAT])] * 2)
     assert len(contacts)
 
-    def answers():
+    def results():
         equal = []
         for x, y in ((0.0, 5e-324), (0.0, -0.0), (np.nan, np.nan), (1.0, 2.0)):
             filled = [{"closest": np.full_like(contacts.closest, z)} for z in (x, y)]
@@ -144,7 +144,7 @@ def test_equality(mode):
             equal += [pair[0] == pair[1], times[0] == times[1]]
         return equal
 
-    found, expected = same(answers, MODES[mode])
+    found, expected = same(results, MODES[mode])
     assert found == expected == [False, False, True, True, True, True, False, False]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One detector asked everything in any order answers as a new one does: nothing of one query counts for another."""
+"""One detector asked everything in any order returns what a new one does: nothing of one query counts for another."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_as_a_new_detector(seed, simd):
     options = {"backend": "cpu", "simd": simd, "threads": 1}
     asked = {report: hc.Detector(scene, report=report, **options) for report in ("all", "first")}
     separation = 0.0
-    answered = 0
+    found_rows = 0
     for call in range(80):
         start = at + 0.1 * rng.normal(size=at.shape) if call % 3 == 0 else at
         end = start + 10.0 ** rng.uniform(-3, 0) * rng.normal(size=at.shape)
@@ -54,5 +54,5 @@ def test_as_a_new_detector(seed, simd):
         else:
             contacts = fresh.detect(start, end)
             assert asked[report].detect(start, end).hash == contacts.hash
-            answered += len(contacts)
-    assert answered > 100
+            found_rows += len(contacts)
+    assert found_rows > 100

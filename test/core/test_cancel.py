@@ -145,7 +145,7 @@ def test_snapshots_within_10_ms(case):
     assert_within_10_ms(lambda: hc.Detector(scene, backend="cpu", threads=1), lambda detector: ask(detector, points))
 
 
-def test_a_cancelled_detector_answers_no_query():
+def test_a_cancelled_detector_results_no_query():
     scene, points, end = layers(3, 0)
     detector = hc.Detector(scene, backend="cpu", minimum_separation=0.1)
     detector.cancel()

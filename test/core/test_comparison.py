@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Answers are compared row by row."""
+"""Results are compared row by row."""
 
 import dataclasses
 
@@ -24,7 +24,7 @@ def meshes():
 
 
 @pytest.mark.parametrize("query", QUERIES)
-def test_answers_are_equal_where_all_rows_are(meshes, query):
+def test_results_are_equal_where_all_rows_are(meshes, query):
     ask = QUERIES[query]
     found = ask(hc.Detector(meshes.scene(), outputs=OUTPUTS, backend="cpu"), meshes)
     again = ask(hc.Detector(meshes.scene(), outputs=OUTPUTS, backend="cpu", threads=1), meshes)
@@ -76,12 +76,12 @@ def _two_parts(meshes, **options):
 @pytest.mark.parametrize(
     ("part", "parts", "error", "text"),
     [
-        (5, 2, ValueError, r"answers\[0\], part: must lie in \[0, 1\], got 5"),
-        (-1, 2, ValueError, r"answers\[0\], part: must lie in \[0, 1\], got -1"),
-        (0, 0, ValueError, r"answers\[0\], parts: must lie in \[1,"),
-        (0, -1, ValueError, r"answers\[0\], parts: must lie in \[1,"),
-        (float("nan"), 1, TypeError, r"answers\[0\], part: expected an integer, got float"),
-        (0, 1.5, TypeError, r"answers\[0\], parts: expected an integer, got float"),
+        (5, 2, ValueError, r"results\[0\], part: must lie in \[0, 1\], got 5"),
+        (-1, 2, ValueError, r"results\[0\], part: must lie in \[0, 1\], got -1"),
+        (0, 0, ValueError, r"results\[0\], parts: must lie in \[1,"),
+        (0, -1, ValueError, r"results\[0\], parts: must lie in \[1,"),
+        (float("nan"), 1, TypeError, r"results\[0\], part: expected an integer, got float"),
+        (0, 1.5, TypeError, r"results\[0\], parts: expected an integer, got float"),
     ],
 )
 def test_parts_that_a_step_does_not_have(meshes, part, parts, error, text):
@@ -90,16 +90,16 @@ def test_parts_that_a_step_does_not_have(meshes, part, parts, error, text):
         contacts_of_step([(first, part, parts)])
 
 
-def test_answers_that_do_not_belong_to_one_step(meshes):
+def test_results_that_do_not_belong_to_one_step(meshes):
     first, second = _two_parts(meshes)
     _, with_points = _two_parts(meshes, outputs=("points",))
     assert len(first) and len(second)
-    with pytest.raises(ValueError, match="answers: some have points and others do not; use detectors with the same"):
+    with pytest.raises(ValueError, match="results: some have points and others do not; use detectors with the same"):
         contacts_of_step([(first, 0, 2), (with_points, 1, 2)])
     assert len(contacts_of_step([(hc.Contacts.none(), 0, 2), (with_points, 1, 2)]).points) == len(with_points)
-    with pytest.raises(TypeError, match=r"answers\[1\]: expected hpccd_core.Contacts, got Proximity"):
+    with pytest.raises(TypeError, match=r"results\[1\]: expected hpccd_core.Contacts, got Proximity"):
         contacts_of_step([(first, 0, 2), (QUERIES["proximity"](hc.Detector(meshes.scene()), meshes), 1, 2)])
-    with pytest.raises(TypeError, match=r"answers\[0\]: expected \(contacts, part, parts\), got Contacts"):
+    with pytest.raises(TypeError, match=r"results\[0\]: expected \(contacts, part, parts\), got Contacts"):
         contacts_of_step([first])
     for bad in (first.vf.astype(np.int64), first.vf.tolist(), first.vf[:, :1]):
         with pytest.raises(TypeError, match=r"contacts: vf is not an array as detectors return it"):

@@ -644,5 +644,5 @@ def test_long_doubles_beyond_float64(scene, detector):
 
 @pytest.mark.parametrize("bad", [None, 3])
 def test_contacts_of_step_takes_a_list(bad):
-    with pytest.raises(TypeError, match=r"^answers: expected a list of \(contacts, part, parts\), got"):
+    with pytest.raises(TypeError, match=r"^results: expected a list of \(contacts, part, parts\), got"):
         contacts_of_step(bad)

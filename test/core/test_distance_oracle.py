@@ -145,15 +145,15 @@ def test_an_edge_meets_a_face_where_a_vertex_that_runs_along_it_does():
 @KINDS
 def test_names_signs_and_powers_of_two_change_nothing(kind):
     for _, queries, distance in near_queries(kind, 6, 10):
-        answer = SEPARATION[kind](queries, distance)
+        result = SEPARATION[kind](queries, distance)
         same = [(np.array([renamed(q, order) for q in queries]), distance) for order, _ in names(kind)]
         same += [(queries[:, :, ::-1], distance), (-queries, distance)]
         for scaled in (np.ldexp(1.0, 480), np.ldexp(1.0, -400)):
             exact = (queries * scaled / scaled == queries).all(axis=(1, 2)) & (distance * scaled / scaled == distance)
             part = SEPARATION[kind](queries[exact] * scaled, distance[exact] * scaled)
-            assert all(np.array_equal(a[exact], b) for a, b in zip(answer, part, strict=True))
+            assert all(np.array_equal(a[exact], b) for a, b in zip(result, part, strict=True))
         for others in same:
-            for a, b in zip(answer, SEPARATION[kind](*others), strict=True):
+            for a, b in zip(result, SEPARATION[kind](*others), strict=True):
                 assert np.array_equal(a, b)
 
 

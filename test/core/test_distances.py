@@ -81,14 +81,14 @@ def assert_gaps(gaps, meshes, vertices, rules, size):
 def test_scenes(generate, accuracy):
     meshes = generate(np.random.default_rng(81))
     for vertices in (meshes.vertices_t1, meshes.vertices_t0):
-        answers = []
+        results = []
         for threads, simd in ((1, "auto"), (3, "auto"), (2, "scalar")):
             detector = hc.Detector(meshes.scene(), accuracy=accuracy, threads=threads, simd=simd, backend="cpu")
             for _ in range(2):
                 gaps = detector.distances(vertices)
-                answers.append(told(gaps))
+                results.append(told(gaps))
         assert_gaps(gaps, meshes, vertices, {}, size_of(vertices))
-        assert all(answer == answers[0] for answer in answers)
+        assert all(result == results[0] for result in results)
 
 
 def apart(rng, n_bodies=4):

@@ -129,7 +129,7 @@ def test_smallest_number_beside_large_ones(scale):
 
 @KINDS
 @pytest.mark.parametrize("accuracy", ACCURACIES)
-def test_every_tier_answers_with_a_time_in_the_unit_interval(kind, accuracy):
+def test_every_tier_results_with_a_time_in_the_unit_interval(kind, accuracy):
     for generator in GENERATORS[kind].values():
         rng = np.random.default_rng(4)
         hit, toc = CORE[kind](disturb(rng, generator(rng, 300), kind), accuracy)
@@ -165,7 +165,7 @@ def test_instruction_sets_agree_to_the_bit(kind, accuracy, simd):
 
 @KINDS
 @pytest.mark.parametrize("accuracy", ACCURACIES)
-def test_answers_do_not_depend_on_neighbours_in_the_batch(kind, accuracy):
+def test_results_do_not_depend_on_neighbours_in_the_batch(kind, accuracy):
     rng = np.random.default_rng(8)
     queries = np.concatenate([disturb(rng, g(rng, 20), kind) for g in GENERATORS[kind].values()])
     hit, toc = CORE[kind](queries, accuracy)

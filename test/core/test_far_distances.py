@@ -164,26 +164,26 @@ def scene_of(generate):
 def test_distances(generate, scale):
     meshes = scene_of(generate)
     vertices = meshes.vertices_t0 * scale
-    answers = []
+    results = []
     for accuracy in TIERS:
         for threads in (1, 7):
             detector = hc.Detector(meshes.scene(), accuracy=accuracy, threads=threads, backend="cpu")
             gaps = detector.distances(vertices)
-            answers.append(told(gaps))
+            results.append(told(gaps))
             detector.distances(np.roll(vertices, 1, axis=0))  # another question between leaves nothing behind
-            answers.append(told(detector.distances(vertices)))
+            results.append(told(detector.distances(vertices)))
     assert_gaps(gaps, meshes, vertices, {}, size_of(vertices))
-    assert all(answer == answers[0] for answer in answers)
+    assert all(result == results[0] for result in results)
 
 
 @pytest.mark.parametrize("generate", SCENES)
 def test_every_instruction_set(generate):
     meshes = scene_of(generate)
-    answers = [
+    results = [
         told(hc.Detector(meshes.scene(), simd=simd, backend="cpu").distances(meshes.vertices_t0))
         for simd in _core.simd_levels()
     ]
-    assert all(answer == answers[0] for answer in answers)
+    assert all(result == results[0] for result in results)
 
 
 def test_of_equally_near_pairs_the_first_is_named():

@@ -57,7 +57,7 @@ def test_meshes_that_shrink_in_the_step():
     assert len(balanced) > 100 and fast.hash == balanced.hash
 
 
-def test_few_wrong_answers_on_ordinary_motion():
+def test_few_wrong_results_on_ordinary_motion():
     faces, start, end = wrinkled(np.random.default_rng(5), 60)
     scene, whole = in_a_room(faces, start, True)
     fast, exact = by_tiers(scene, whole(start), whole(end), "fast", "exact")

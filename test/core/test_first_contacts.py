@@ -56,12 +56,12 @@ def test_any_threads_and_instruction_set(generate, accuracy):
     for seed in range(3):
         meshes = apart_at_first(generate, seed)
         scene = meshes.scene()
-        answers = {
+        results = {
             assert_first(scene, meshes, accuracy=accuracy, threads=threads, simd=simd)
             for threads, simd in [*((t, "auto") for t in (1, 2, 3, 7)), *((2, simd) for simd in usable_simd())]
         }
-        assert len(answers) == 1
-        ((n, n_first, _, _),) = answers
+        assert len(results) == 1
+        ((n, n_first, _, _),) = results
         assert n > 0 and n_first >= 1
 
 
@@ -70,11 +70,11 @@ def test_any_threads_and_instruction_set(generate, accuracy):
 def test_any_method(method, accuracy):
     for generate, seed in itertools.product(SCENES, range(2)):
         meshes = apart_at_first(generate, seed)
-        answers = {
+        results = {
             assert_first(meshes.scene(), meshes, accuracy=accuracy, method=m, threads=t)
             for m, t in (("default", 2), (method, 1), (method, 3))
         }
-        assert len(answers) == 1
+        assert len(results) == 1
 
 
 @ACCURACIES
@@ -103,15 +103,15 @@ def test_accuracies_of_pairs_of_meshes():
             for b in range(a, 5):
                 scene.set_accuracy(f"mesh{a}", f"mesh{b}", tiers[rng.integers(4)])
         v0, v1 = meshes.vertices_t0, meshes.vertices_t1
-        answers = set()
+        results = set()
         for threads in (1, 3):
             every, first = (detector(scene, report, threads=threads) for report in ("all", "first"))
             contacts, earliest = every.detect(v0, v1), first.detect(v0, v1)
             assert is_first(earliest, contacts)
             step = every.collision_free_step(v0, v1)
             assert contacts.first_toc - EARLY <= step <= contacts.first_toc
-            answers.add((earliest.hash, step))
-        assert len(answers) == 1
+            results.add((earliest.hash, step))
+        assert len(results) == 1
 
 
 @ACCURACIES
@@ -188,8 +188,8 @@ def test_many_contacts_at_one_time(accuracy):
         (faces, flat, flat),
         (np.array([[0, 1, 2]]), [[0, 0, 9.0], [9, 0, 9], [0, 9, 9]], [[0, 0, -1.0], [9, 0, -1], [0, 9, -1]]),
     )
-    answers = {assert_first(meshes.scene(), meshes, accuracy=accuracy, threads=t) for t in (1, 2, 3, 7)}
-    ((n, n_first, _, step),) = answers
+    results = {assert_first(meshes.scene(), meshes, accuracy=accuracy, threads=t) for t in (1, 2, 3, 7)}
+    ((n, n_first, _, step),) = results
     assert n > n_first > 1000 and step == pytest.approx(0.5, abs=1e-6)
 
 

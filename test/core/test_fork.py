@@ -29,7 +29,7 @@ def child():
     except RuntimeError as error:
         assert "make one after the fork" in str(error)
     else:
-        raise AssertionError("a detector without its threads has answered")
+        raise AssertionError("a detector without its threads has returned a result")
     several = None
 
 if os.fork() == 0:

@@ -41,7 +41,7 @@ def test_promises_are_kept(question, size, rounds):
         tally = tallies[question, accuracy, kind]
         failing = [(b.queries[0].tolist(), float(b.distances[0])) for b in tally.failing[:1]]
         assert tally.broken == 0, f"{accuracy} {kind}: {failing}"
-        assert tally.queries / 10 < tally.hits < tally.queries, "the generators must aim at both answers"
+        assert tally.queries / 10 < tally.hits < tally.queries, "the generators must aim at both results"
     for kind in questions.kinds_of(question):
         exact, conservative = (tallies[question, accuracy, kind] for accuracy in ("exact", "conservative"))
         assert exact.missed == exact.invented == conservative.missed == 0
@@ -119,7 +119,7 @@ class Mistakes:
 
     @staticmethod
     def stale(self, start, end):
-        """Answers for the same start as it did for another end."""
+        """For the same start as before, and another end."""
         step = super(hc.Detector, self).collision_free_step(start, end)
         key = start.tobytes()
         if getattr(self, "kept", (None, 0))[0] != key:

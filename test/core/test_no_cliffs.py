@@ -53,7 +53,7 @@ def test_a_separation_that_changes_nothing_forgets_nothing(again):
         scene.add_mesh(name, faces, static=name != "a")
     detector = hc.Detector(scene, minimum_separation=1e-3, backend="cpu", threads=1)
     steps = [detector.collision_free_step(start, end) for _ in range(5)]
-    assert detector.stats["node_pairs"] == 0  # what is known to be near answers, without the tree
+    assert detector.stats["node_pairs"] == 0  # what is known to be near results, without the tree
     again(detector)
     assert detector.collision_free_step(start, end) == steps[-1]
     assert detector.stats["node_pairs"] == 0

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Detection with separation and queries of one snapshot: the same bytes and hash with any instruction set and any
-number of threads, on a new detector and on one that has answered other queries before."""
+number of threads, on a new detector and on one that has computed other queries before."""
 
 import numpy as np
 import pytest
@@ -24,14 +24,14 @@ ARRAYS = (
 )
 
 
-def as_bytes(answer):
-    """All that an answer holds."""
-    if isinstance(answer, list):
+def as_bytes(result):
+    """All that a result holds."""
+    if isinstance(result, list):
         return [
-            (g.mesh_a, g.mesh_b, float(g.distance).hex(), g.kind, tuple(g.features), g.points.tobytes()) for g in answer
+            (g.mesh_a, g.mesh_b, float(g.distance).hex(), g.kind, tuple(g.features), g.points.tobytes()) for g in result
         ]
-    arrays = {name: getattr(answer, name) for name in ARRAYS if hasattr(answer, name)}
-    return answer.hash, {name: (a.shape, a.dtype.str, a.tobytes()) for name, a in arrays.items()}
+    arrays = {name: getattr(result, name) for name in ARRAYS if hasattr(result, name)}
+    return result.hash, {name: (a.shape, a.dtype.str, a.tobytes()) for name, a in arrays.items()}
 
 
 QUERIES = {
@@ -52,21 +52,21 @@ def crowd(rng):
 @pytest.mark.parametrize("generate", [crowd, random_scenes.lone_vertices, random_scenes.huge_and_tiny])
 def test_the_same_bytes(generate):
     meshes = generate(np.random.default_rng(51))
-    answers = {query: [] for query in QUERIES}
+    results = {query: [] for query in QUERIES}
     for simd in usable_simd():
         for threads in (1, 2, 16):
             options = {"simd": simd, "threads": threads, "backend": "cpu", "outputs": OUTPUTS}
             detector = hc.Detector(meshes.scene(), minimum_separation=0.125, **options)
             for _ in range(2):
                 for query, ask in QUERIES.items():
-                    answers[query].append(as_bytes(ask(detector, meshes.vertices_t0, meshes.vertices_t1)))
-    for query, given in answers.items():
-        assert all(answer == given[0] for answer in given), query
+                    results[query].append(as_bytes(ask(detector, meshes.vertices_t0, meshes.vertices_t1)))
+    for query, given in results.items():
+        assert all(result == given[0] for result in given), query
     found = QUERIES["separation"](detector, meshes.vertices_t0, meshes.vertices_t1)
     assert len(found.vf) and len(found.ee) and len(QUERIES["intersections"](detector, None, meshes.vertices_t1).ef)
 
 
-def test_what_is_compared_tells_answers_apart():
+def test_what_is_compared_tells_results_apart():
     meshes = crowd(np.random.default_rng(52))
     detector = hc.Detector(meshes.scene(), minimum_separation=0.125, backend="cpu", outputs=OUTPUTS)
     for ask in QUERIES.values():

@@ -29,7 +29,7 @@ def test_distance_is_zero_at_toc_and_not_before(kind, generator):
 
 
 @pytest.mark.parametrize("kind", GENERATORS)
-def test_reversed_time_and_swapped_axes_change_no_answer(kind):
+def test_reversed_time_and_swapped_axes_change_no_result(kind):
     for generator in GENERATORS[kind].values():
         queries = generator(np.random.default_rng(5), 300)
         hit, toc = ORACLE[kind](queries)

@@ -55,8 +55,8 @@ def test_between_queries_of_all_sorts():
     assert len(hashes) > 3
 
 
-def test_during_queries_each_answer_is_of_one_state():
-    """A call under way ends first: every answer is that of one of the two separations, none of a mixture."""
+def test_during_queries_each_result_is_of_one_state():
+    """A call under way ends first: every result is that of one of the two separations, none of a mixture."""
     meshes = random_scenes.many_meshes(np.random.default_rng(63))
     v0, v1 = meshes.vertices_t0, meshes.vertices_t1
     states = [(0, 1, 0.0), (0, 1, 0.75)]

@@ -105,9 +105,9 @@ def test_instruction_sets_agree_to_the_bit(kind):
     for accuracy in ("exact", "conservative", "balanced", "fast"):
         for name, generate in list(NEAR_GENERATORS[kind].items())[::3]:
             queries, _ = generate(np.random.default_rng(3), 100)
-            answers = [TEST[kind](queries, accuracy, simd=s, minimum_separation=0.75) for s in usable_simd()]
-            for hit, toc in answers[1:]:
-                assert np.array_equal(hit, answers[0][0]) and np.array_equal(toc, answers[0][1]), (accuracy, name)
+            results = [TEST[kind](queries, accuracy, simd=s, minimum_separation=0.75) for s in usable_simd()]
+            for hit, toc in results[1:]:
+                assert np.array_equal(hit, results[0][0]) and np.array_equal(toc, results[0][1]), (accuracy, name)
 
 
 @KINDS
@@ -134,17 +134,17 @@ def test_conservative_gives_the_same_pairs_as_exact(kind):
 def test_names_and_powers_of_two_change_nothing(kind):
     for name in list(NEAR_GENERATORS[kind])[::4]:
         queries, distances = NEAR_GENERATORS[kind][name](np.random.default_rng(6), 60)
-        answer = asked(kind, queries, distances)
+        result = asked(kind, queries, distances)
         for order, _ in names(kind):
             found = asked(kind, np.array([query_renamed(q, order) for q in queries]), distances)
-            assert np.array_equal(found[0], answer[0])
-            assert (np.abs(found[1][answer[0]] - answer[1][answer[0]]) <= 2e-12).all()
+            assert np.array_equal(found[0], result[0])
+            assert (np.abs(found[1][result[0]] - result[1][result[0]]) <= 2e-12).all()
         for factor in (2.0**300, 2.0**-300):
             found = asked(kind, queries * factor, distances * factor)
             exact = (queries * factor / factor == queries).all(axis=(1, 2)) & (distances * factor / factor == distances)
-            assert np.array_equal(found[0][exact], answer[0][exact])
-            hit = exact & answer[0]
-            assert (np.abs(found[1][hit] - answer[1][hit]) <= 2e-12).all()
+            assert np.array_equal(found[0][exact], result[0][exact])
+            hit = exact & result[0]
+            assert (np.abs(found[1][hit] - result[1][hit]) <= 2e-12).all()
 
 
 @KINDS

@@ -17,7 +17,7 @@ DISTANCE = {VERTEX_FACE: oracle.distance_vertex_face, EDGE_EDGE: oracle.distance
 WITHIN = {VERTEX_FACE: oracle.within_vertex_face, EDGE_EDGE: oracle.within_edge_edge}
 SEPARATION = {VERTEX_FACE: oracle.separation_vertex_face, EDGE_EDGE: oracle.separation_edge_edge}
 TEST = {VERTEX_FACE: hc.test_vertex_face, EDGE_EDGE: hc.test_edge_edge}
-# Parts of the true distance. Only at 1 is the answer yes, or a matter of the last bit.
+# Parts of the true distance. Only at 1 is the result a contact, or a matter of the last bit.
 PARTS = (0.3, 0.6, 0.9, 1 - 1e-9, 1 - 2**-52, 1.0)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coordinates of all magnitudes at once: exact answers in less than a millisecond each.
+"""Coordinates of all magnitudes at once: exact results in less than a millisecond each.
 
 slowest_queries.npz holds the worst that hours of `python -m fuzz.slowest` and an attack by hand found.
 """
@@ -38,7 +38,7 @@ def processor_time(call, *arguments):
 
 
 @KINDS
-def test_answers(kind, queries):
+def test_results(kind, queries):
     hit, toc = TEST[kind](queries, "exact")
     true_hit, true_toc = ORACLE[kind](queries)
     np.testing.assert_array_equal(hit, true_hit)

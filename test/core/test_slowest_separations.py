@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Separation of coordinates of all magnitudes: exact answers, and no cliff.
+"""Separation of coordinates of all magnitudes: exact results, and no cliff.
 
 slowest_separations.npz holds the slowest of two short searches by `python -m fuzz.slowest`, one of them with
 exponents at most 200 apart.
@@ -27,7 +27,7 @@ def queries(kind, span):
 
 @KINDS
 @LIMITS
-def test_answers_and_time(kind, span, limit, queries):
+def test_results_and_time(kind, span, limit, queries):
     for points, distance in queries:
         seconds = []
         for _ in range(5):

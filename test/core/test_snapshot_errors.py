@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Positions that queries of one snapshot reject, by name, place and remedy; and that they answer well afterwards."""
+"""Positions that queries of one snapshot reject, by name, place and remedy; and that they work afterwards."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ QUERIES = {
 EACH = pytest.mark.parametrize("query", QUERIES)
 
 
-def answer_of(found):
+def response_of(found):
     return [(g.distance, g.kind, g.features) for g in found] if isinstance(found, list) else found.hash
 
 
@@ -26,7 +26,7 @@ def test_coordinates_that_are_no_places(query, dtype, bad):
     meshes = random_scenes.many_meshes(np.random.default_rng(91))
     detector = hc.Detector(meshes.scene(), backend="cpu", threads=2)
     good = meshes.vertices_t1.astype(dtype)
-    before = answer_of(QUERIES[query](detector, good))
+    before = response_of(QUERIES[query](detector, good))
     with np.errstate(over="ignore"):  # of float32 what is too large is infinite
         for row, axis in ((0, 0), (len(good) // 2, 2), (len(good) - 1, 1)):
             vertices = good.copy()
@@ -35,7 +35,7 @@ def test_coordinates_that_are_no_places(query, dtype, bad):
                 QUERIES[query](detector, vertices)
             text = str(rejected.value)
             assert "must be finite" in text or "beyond 1e+300: intermediate results could overflow; scale" in text
-    assert answer_of(QUERIES[query](detector, good)) == before
+    assert response_of(QUERIES[query](detector, good)) == before
 
 
 @EACH

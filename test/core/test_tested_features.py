@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Option features: the full answer with the other kind left out, bit for bit, from every way to find it."""
+"""Option features: the full result with the other kind left out, bit for bit, from every way to find it."""
 
 import itertools
 import math
@@ -22,13 +22,13 @@ def mesh_of(meshes):
     return np.repeat(numbers, meshes.n_vertices), np.repeat(numbers, [len(faces) for faces in meshes.faces])
 
 
-def kept(answer, tested, meshes, time="toc"):
-    """What of a full answer is tested. tested(a, b): the features between two meshes."""
+def kept(result, tested, meshes, time="toc"):
+    """What of a full result is tested. tested(a, b): the features between two meshes."""
     of_vertex, of_face = mesh_of(meshes)
-    vf = [i for i, (v, f) in enumerate(answer.vf) if "vertex_face" in tested(of_vertex[v], of_face[f])]
-    ee = [i for i, (a, _, b, _) in enumerate(answer.ee) if "edge_edge" in tested(of_vertex[a], of_vertex[b])]
-    values = {f"vf_{time}": getattr(answer, f"vf_{time}")[vf], f"ee_{time}": getattr(answer, f"ee_{time}")[ee]}
-    return {"vf": answer.vf[vf], "ee": answer.ee[ee], **values}
+    vf = [i for i, (v, f) in enumerate(result.vf) if "vertex_face" in tested(of_vertex[v], of_face[f])]
+    ee = [i for i, (a, _, b, _) in enumerate(result.ee) if "edge_edge" in tested(of_vertex[a], of_vertex[b])]
+    values = {f"vf_{time}": getattr(result, f"vf_{time}")[vf], f"ee_{time}": getattr(result, f"ee_{time}")[ee]}
+    return {"vf": result.vf[vf], "ee": result.ee[ee], **values}
 
 
 def assert_holds(found, expected):
@@ -38,7 +38,7 @@ def assert_holds(found, expected):
 
 @pytest.mark.parametrize("make", random_scenes.ALL, ids=lambda make: make.__name__)
 @pytest.mark.parametrize("accuracy", ["fast", "balanced", "conservative", "exact"])
-def test_the_full_answer_with_the_other_kind_left_out(make, accuracy):
+def test_the_full_result_with_the_other_kind_left_out(make, accuracy):
     meshes = make(np.random.default_rng(91))
     scene, motion = meshes.scene(), (meshes.vertices_t0, meshes.vertices_t1)
     for separation in (0.0, 0.0625):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Steps asked for again and again of one detector, as line searches do: what it keeps of a start, which it knows by its
-contents, never shows in an answer."""
+contents, never shows in a result."""
 
 import threading
 import time
@@ -44,7 +44,7 @@ def fresh_step(scene, v0, v1, separation=0.0, **options):
 @ACCURACIES
 @pytest.mark.parametrize("threads", [1, 3])
 def test_shorter_longer_and_turned_steps(accuracy, threads):
-    """Each as a new detector answers it, in any order, between other queries."""
+    """Each as a new detector computes it, in any order, between other queries."""
     rng = np.random.default_rng(81)
     for seed in range(4):
         meshes = lifted(seed)
@@ -158,7 +158,7 @@ def waving_sheets(rng, n=24):
 @pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("separation", [0.0, 0.125])
 def test_steps_that_go_far_where_neighbours_stay_together(accuracy, threads, separation):
-    """Several edges until the first contact, from one start and from others nearby: as a new detector answers them, by
+    """Several edges until the first contact, from one start and from others nearby: as a new detector computes them, by
     few pairs of leaves."""
     rng = np.random.default_rng(86)
     scene, start, way = waving_sheets(rng)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Each of many worlds is answered bit for bit as by a detector of its own, whatever the others are."""
+"""Each of many worlds has results that are bit-identical to those of a detector of its own, whatever the others are."""
 
 import itertools
 
@@ -269,7 +269,7 @@ def test_what_is_near_is_known_but_no_tree_is_there_yet(report):
         assert first(fallen(0.4)).max() <= 0.5
 
 
-def test_without_worlds_an_answer_is_of_one():
+def test_without_worlds_a_result_is_of_one():
     worlds = many_worlds.crumpled(1)
     one, single = worlds.detector(), hc.Detector(worlds.scene, backend="cpu")
     found, expected = one.detect(worlds.start, worlds.end), single.detect(worlds.start[0], worlds.end[0])

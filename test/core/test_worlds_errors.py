@@ -95,13 +95,13 @@ def test_a_rejected_step_does_not_count(worlds):
 @pytest.mark.parametrize("k", [9, -1, 10**9])
 def test_a_world_that_is_not_there(worlds, k):
     detector = worlds.detector()
-    for answer in (
+    for result in (
         detector.detect(worlds.start, worlds.end),
         detector.proximity(worlds.start, 0.1),
         detector.intersections(worlds.start),
     ):
         with pytest.raises(ValueError, match=r"world: must lie in \[0, 8\]"):
-            answer.world(k)
+            result.world(k)
     with pytest.raises(ValueError, match=r"world: must lie in \[0, 0\]"):
         hc.Detector(worlds.scene, backend="cpu").detect(worlds.start[0], worlds.end[0]).world(k)
 

@@ -50,7 +50,7 @@ def test_demo(hpccd, tmp_path, demo_domain):
     assert (out / "thesis.txt").read_text() == "mine"
     logs = {"node.log", "publisher.log", "recorder.log"}
     assert {path.name for path in out.iterdir()} == {"demo.mcap", "demo.png", "node.yaml", "thesis.txt", *logs}
-    wanted = ("39 of 39 steps, 0 frames dropped", "39 recorded answers", "ms a frame", "all equal")
+    wanted = ("39 of 39 steps, 0 frames dropped", "39 recorded results", "ms a frame", "all equal")
     for part in (*wanted, "worst frame: step", "try next"):
         assert part in done.stdout
     assert "hpccd-demo/demo.mcap" in done.stdout and "hpccd-demo/demo.png" in done.stdout
@@ -118,7 +118,7 @@ def test_no_frame_is_lost_on_a_machine_that_is_too_slow(tmp_path, demo_domain):
     said = "".join(lines)
     assert process.wait(PATIENCE) == 0, said
     assert "49 of 49 steps, 0 frames dropped" in said
-    assert "verified   49 recorded answers" in said
+    assert "verified   49 recorded results" in said
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the demo says of a node that it listens to: answers and dropped frames, as the node counts them."""
+"""What the demo says of a node that it listens to: results and dropped frames, as the node counts them."""
 
 import time
 
@@ -18,7 +18,7 @@ def _status(part, **values):
 
 @pytest.fixture
 def told():
-    """A monitor that was told of 63 answers and 26 frames of two meshes that were dropped."""
+    """A monitor that was told of 63 results and 26 frames of two meshes that were dropped."""
     context = rclpy.Context()
     rclpy.init(context=context)
     node = rclpy.create_node("told", context=context, start_parameter_services=False)
@@ -47,5 +47,5 @@ def test_a_dropped_frame_of_two_meshes_is_one(told):
     assert told.dropped == 26
 
 
-def test_answers_that_were_not_heard_count_too(told):
-    assert (told.answers, told.core_ms) == (63, 2.5)
+def test_results_that_were_not_heard_count_too(told):
+    assert (told.results, told.core_ms) == (63, 2.5)

@@ -60,7 +60,7 @@ def test_speeds():
 
 
 def test_a_step_knows_the_distances_at_its_start_where_they_were_asked_for():
-    """Those of a frame that was no end of an answered step are not known, nor those of a step without distances."""
+    """Those of a frame that was no end of a processed step are not known, nor those of a step without distances."""
     builder = SceneBuilder(tuple(map(MeshSettings, "ab")))
     detector = StepDetector(builder, Options(backend="cpu", threads=1, distances=True))
     frames = [SceneFrame(k, k, "", TOPOLOGIES, (HAND + (0, 0, 1 - 0.25 * k), FLOOR), ("a",), 0.0) for k in range(5)]

@@ -68,8 +68,8 @@ def test_a_distance_that_nobody_computed_is_unknown():
     assert all(math.isnan(one.distance) for one in summarise(detection(builder)))
 
 
-def test_an_answer_of_the_scene_before_has_the_pairs_of_its_own():
-    """Another description of a robot may make another scene before the last answer is told."""
+def test_a_result_of_the_scene_before_has_the_pairs_of_its_own():
+    """Another description of a robot may make another scene before the last result is told."""
     found = detection(SceneBuilder(MESHES, (("a", "b"),)))
     told = {(one.mesh_a, one.mesh_b) for one in summarise(found)}
     assert ("a", "a") in told and ("a", "room") in told and ("a", "b") not in told

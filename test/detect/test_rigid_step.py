@@ -161,7 +161,7 @@ def test_first_and_any(report):
             assert len(found) == at_first
 
 
-def test_separations_change_without_a_new_scene_and_answers_do_not_depend_on_what_came_before():
+def test_separations_change_without_a_new_scene_and_results_do_not_depend_on_what_came_before():
     start, end = random_step(np.random.default_rng(2))
     wide = Separation(0.0, (("blade", "cloth", 0.05), ("cloth", "cloth", 0.002)))
     fresh = {}

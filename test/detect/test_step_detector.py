@@ -70,7 +70,7 @@ def test_static_meshes_are_where_they_are_at_the_end():
     assert len(StepDetector(builder, Options()).detect(start, end).contacts) > 0
 
 
-def test_errors_of_the_core_are_raised_and_the_next_step_is_answered(detector):
+def test_errors_of_the_core_are_raised_and_the_next_step_is_processed(detector):
     with pytest.raises(ValueError, match=r"1e\+150"):
         detector.detect(frame(1, 0.5), frame(2, 1e200))
     detector.options = replace(detector.options, accuracy="sloppy")

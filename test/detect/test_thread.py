@@ -30,14 +30,14 @@ def frame(stamp, z, topology=OLD):
 class Run:
     """What a detection thread made of ``frames``."""
 
-    def __init__(self, *frames, reject_answer_at=None):
+    def __init__(self, *frames, reject_result_at=None):
         self.steps, self.starts, self.failed = [], [], []
-        self.reject_answer_at = reject_answer_at
+        self.reject_result_at = reject_result_at
         queue = FrameQueue(100)
         thread = DetectionThread(
             StepDetector(SceneBuilder((MeshSettings("cloth"),)), Options()),
             queue,
-            on_detection=self._answer,
+            on_detection=self._result,
             on_first=self.starts.append,
             on_failure=lambda frame, error: self.failed.append((frame.stamp, str(error))),
         )
@@ -50,9 +50,9 @@ class Run:
         thread.join(timeout=300)
         assert not thread.is_alive()
 
-    def _answer(self, found):
-        if found.end.stamp == self.reject_answer_at:
-            raise MemoryError("no room for the answer")
+    def _result(self, found):
+        if found.end.stamp == self.reject_result_at:
+            raise MemoryError("no room for the result")
         self.steps.append((found.start.stamp, found.end.stamp, len(found.contacts)))
 
 
@@ -63,10 +63,10 @@ def test_step_over_a_frame_that_cannot_be_tested():
     assert [stamp for stamp, _ in run.failed] == [2] and "1e+150" in run.failed[0][1]
 
 
-def test_step_whose_answer_could_not_be_sent():
-    run = Run(frame(1, 0.5), frame(2, -0.5), frame(3, -0.7), reject_answer_at=2)
+def test_step_whose_result_could_not_be_sent():
+    run = Run(frame(1, 0.5), frame(2, -0.5), frame(3, -0.7), reject_result_at=2)
     assert [step[:2] for step in run.steps] == [(1, 3)] and run.steps[0][2] > 0
-    assert run.failed == [(2, "no room for the answer")]
+    assert run.failed == [(2, "no room for the result")]
 
 
 @pytest.mark.parametrize("after", [frame(4, 0.5, NEW), frame(0, 0.5)], ids=["topology", "restart"])

@@ -54,7 +54,7 @@ def test_with_a_node_in_the_loop(tmp_path, capsys):
     assert "intersections  0 in all 30 frames" in said
     check_same_frames(tmp_path / "here.npz", tmp_path / "dds.npz")
     assert cli.main(["replay", str(tmp_path / "dds.mcap")]) == 0
-    assert "VERIFIED: 29 answers are equal" in capsys.readouterr().out
+    assert "VERIFIED: 29 results are equal" in capsys.readouterr().out
 
 
 def test_moves_that_are_shortened_are_the_same_over_dds(tmp_path):

@@ -155,7 +155,7 @@ def test_no_message_is_unaccounted_for(queued):
     held = MeshSettings("cloth", transform="tf")
     pipeline = pipeline_of(held, BALL, FLOOR, frame_id="world", restart_after=4)
     queue = pipeline.start(2) if queued else None
-    sent = answered = rejected = 0
+    sent = processed = rejected = 0
     for i in range(3000):
         mesh = rng.choice(["cloth", "ball", "cloth", "ball", "floor"])
         stamp = i // 6 + int(rng.integers(-2, 3))
@@ -169,11 +169,11 @@ def test_no_message_is_unaccounted_for(queued):
             if queue is not None:
                 enqueued(pipeline, outcome)
             rejected += len(outcome.rejections)
-            answered += outcome.static_taken
+            processed += outcome.static_taken
             if queue is None:
-                answered += sum(len(f.fresh) for f in outcome.frames)
+                processed += sum(len(f.fresh) for f in outcome.frames)
         if queue is not None and rng.random() < 0.2 and queue.frames():
-            answered += len(queue.pop().frame.fresh)
-        assert answered + rejected + pipeline.waiting == sent
+            processed += len(queue.pop().frame.fresh)
+        assert processed + rejected + pipeline.waiting == sent
     rejected += len(pipeline.stop().rejections)
-    assert answered + rejected == sent and answered > 100 and rejected > 100
+    assert processed + rejected == sent and processed > 100 and rejected > 100

@@ -103,7 +103,7 @@ def test_poses_too_far_away():
 
 @pytest.mark.parametrize("far, taken", [(9e146, True), (1.1e147, False), (9e149, False)])
 def test_poses_whose_arcs_would_leave_what_the_core_takes_are_rejected_at_once(far, taken):
-    """Whichever two come, the step between them is answered: half a turn, with a separation and a mesh as far away."""
+    """Whichever two come, the step between them is processed: half a turn, with a separation and a mesh as far away."""
     half = Rigid.of((far, far, 0), (0, 0, 1, 0))
     poses = [Rigid.of((far, far, 0), (0, 0, 0, 1)), half, Rigid.of((-far, -far, far), (1, 0, 0, 0))]
     pipeline = pipeline_of(BOX, MeshSettings("tool", self_collision=False, input="pose"))

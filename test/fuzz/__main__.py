@@ -72,7 +72,7 @@ def _parser() -> argparse.ArgumentParser:
         "status 1 where exact differs (time or distance: by more than 1e-12), where conservative misses a pair, "
         "reports it late or, where distances count, differs in the same way, where either lets a scene go too far or "
         "ends it more than 1e-9 too early, where report='first' is not the earliest contacts of 'all', or where an "
-        "instruction set's answer differs; fast and balanced promise no more and are only counted.",
+        "instruction set's result differs; fast and balanced promise no more and are only counted.",
     )
     length = p.add_mutually_exclusive_group()
     length.add_argument("--seconds", type=float, default=60.0, help="how long (default 60)")

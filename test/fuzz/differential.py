@@ -12,7 +12,7 @@ import numpy as np
 import hpccd_core as hc
 
 from . import questions
-from .questions import CONTACT, DISTANCES, INTERSECTIONS, PROXIMITY, SEPARATION, STEP, Answers, Batch
+from .questions import CONTACT, DISTANCES, INTERSECTIONS, PROXIMITY, SEPARATION, STEP, Batch, Results
 from .steps import EARLY, contradict
 
 SIMD = ("scalar", "avx2", "avx512", "neon")
@@ -101,13 +101,13 @@ def batches(seed: int, size: int, asked: Sequence[str] = QUESTIONS) -> Iterator[
         number += 1
 
 
-def compare(batch: Batch, accuracy: str, simd: Sequence[str], truth: Answers) -> Disagreement:
+def compare(batch: Batch, accuracy: str, simd: Sequence[str], truth: Results) -> Disagreement:
     """Query one tier with each instruction set; the results of the first are compared with the truth.
 
     Raises AssertionError for an invalid result: NaN, or a time outside [0,1].
     """
     true_hit, true_value = truth
-    (hit, value), *others = (questions.answers(batch, accuracy, s) for s in simd)
+    (hit, value), *others = (questions.results(batch, accuracy, s) for s in simd)
     # A distance of meshes is told whether or not they touch; it is infinite where they have no pair of features.
     # A step is told where nothing touches too.
     always = batch.question in (DISTANCES, STEP)
@@ -127,10 +127,10 @@ def compare(batch: Batch, accuracy: str, simd: Sequence[str], truth: Answers) ->
         missed &= true_value < 1  # a contact just at the end
         for s in simd:
             uneven |= contradict(batch.kind, batch.queries, batch.distances, accuracy, s)
-    if batch.question == DISTANCES:  # of several answers for each scene the worst
+    if batch.question == DISTANCES:  # of several results for each scene the worst
         worst = np.abs(late).argmax(axis=1)[:, None]
         late = np.take_along_axis(late, worst, axis=1)[:, 0]
-        missed, invented, uneven = (answers.any(axis=1) for answers in (missed, invented, uneven))
+        missed, invented, uneven = (results.any(axis=1) for results in (missed, invented, uneven))
     return Disagreement(missed, invented, late, uneven, batch.question)
 
 

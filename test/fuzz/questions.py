@@ -25,8 +25,8 @@ DISTANCES, STEP = "distances", "step"
 OF_SCENES = (DISTANCES, STEP)
 PAIRS_OF_A_SCENE = 10  # a batch has a tenth as many scenes as single pairs: each scene has dozens of pairs
 
-# hit (Q,) bool; value (Q,) float64: time, distance, or 0. Of distances (Q,N): several answers for each scene.
-Answers = tuple[np.ndarray, np.ndarray]
+# hit (Q,) bool; value (Q,) float64: time, distance, or 0. Of distances (Q,N): several results for each scene.
+Results = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def generated(question: str, kind: str, generator: str, rng: np.random.Generator
     return Batch(question, kind, generator, queries, distances)
 
 
-def truth(batch: Batch, threads: int = 0) -> Answers:
+def truth(batch: Batch, threads: int = 0) -> Results:
     """The oracle's results, on `threads` threads."""
     if batch.question == DISTANCES:
         return true_gaps(batch.kind, batch.queries)
@@ -90,7 +90,7 @@ def truth(batch: Batch, threads: int = 0) -> Answers:
     return oracle.edge_face_intersect(batch.queries, threads), np.zeros(len(batch.queries))
 
 
-def answers(batch: Batch, accuracy: str, simd: str) -> Answers:
+def results(batch: Batch, accuracy: str, simd: str) -> Results:
     """The core's results."""
     if batch.question in (CONTACT, SEPARATION):
         return _times(batch, accuracy, simd)
@@ -111,7 +111,7 @@ def size_of(batch: Batch) -> np.ndarray:
 CORE = {VERTEX_FACE: hc.test_vertex_face, EDGE_EDGE: hc.test_edge_edge}
 
 
-def _times(batch: Batch, accuracy: str, simd: str) -> Answers:
+def _times(batch: Batch, accuracy: str, simd: str) -> Results:
     test = CORE[batch.kind]
     if batch.question == CONTACT:
         return test(batch.queries, accuracy=accuracy, simd=simd)
@@ -123,7 +123,7 @@ def _times(batch: Batch, accuracy: str, simd: str) -> Answers:
     return hit, toc
 
 
-def _of_snapshots(batch: Batch, accuracy: str, simd: str) -> Answers:
+def _of_snapshots(batch: Batch, accuracy: str, simd: str) -> Results:
     detector = detector_of_pair(batch.kind, accuracy, simd)
     hit, value = np.zeros(len(batch.queries), bool), np.full(len(batch.queries), np.inf)
     for i, (points, distance) in enumerate(zip(batch.queries, batch.distances, strict=True)):

@@ -171,7 +171,7 @@ def _parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="python -m fuzz.slowest",
         description="Search for the queries that take accuracy='exact' longest, by changing the slowest ones found so "
-        "far, from the beginning again and again; the shortest of ten times counts. Exit status 1 where an answer "
+        "far, from the beginning again and again; the shortest of ten times counts. Exit status 1 where a result "
         "differs from the exact oracle's.",
     )
     p.add_argument("--seconds", type=float, default=60.0, help="how long (default 60)")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Answers on the device, and of many worlds, beside those of CPUs."""
+"""Results on the device, and of many worlds, beside those of CPUs."""
 
 import numpy as np
 import scenes

@@ -41,20 +41,20 @@ for make in (scenes.crumpled, scenes.lattice, scenes.soup, scenes.fringed):
         lambda d, t1=t1: d.proximity(t1.astype(np.float32), 0.1),
         lambda d, t1=t1: d.intersections(t1),
     ):
-        answers = {backend: query(detector) for backend, detector in detectors.items()}
-        print(make.__name__, answers)
-        if len({answer.hash for answer in answers.values()}) > 1:
-            sys.exit(f"{make.__name__}: answers differ")
+        results = {backend: query(detector) for backend, detector in detectors.items()}
+        print(make.__name__, results)
+        if len({result.hash for result in results.values()}) > 1:
+            sys.exit(f"{make.__name__}: results differ")
     for backend in ("gpu", "hybrid"):
         if detectors[backend].stats["gpu_fallbacks"]:
             sys.exit(f"{make.__name__}, {backend}: {detectors[backend].last_gpu_error}")
 
 
-def answers(detector, t0, t1):
+def query_results(detector, t0, t1):
     """What it says to everything, on the host, in small arrays that can be compared."""
     found = [detector.detect(t0, t1), detector.proximity(t0, 0.1), detector.intersections(t1)]
-    hashes = [answer.hash for answer in found]
-    on_host = [answer.to_host() if hasattr(answer, "to_host") else answer for answer in found]
+    hashes = [result.hash for result in found]
+    on_host = [result.to_host() if hasattr(result, "to_host") else result for result in found]
     rows = [np.concatenate([a.vf_toc, a.ee_toc]) for a in on_host[:1]] + [a.vf_distance for a in on_host[1:2]]
     free = np.atleast_1d(detector.collision_free_step(t0, t1))
     return hashes, [*rows, on_host[2].ef.ravel(), on_host[0].vf_offsets, on_host[0].first_tocs, free]
@@ -63,14 +63,14 @@ def answers(detector, t0, t1):
 def check(what, scene, t0, t1, **options):
     """Results on the host and on the device, twice: with lists that have to grow, and with those that have."""
     host = {name: value for name, value in options.items() if name != "outputs"}
-    expected = answers(hc.Detector(scene, backend="cpu", threads=1, **host), t0, t1)
+    expected = query_results(hc.Detector(scene, backend="cpu", threads=1, **host), t0, t1)
     for results in ("host", "device"):
         detector = hc.Detector(scene, backend="gpu", threads=2, results=results, **options)
         for _ in range(2):
-            found = answers(detector, t0, t1)
+            found = query_results(detector, t0, t1)
             same = all(map(np.array_equal, found[1], expected[1]))
             if found[0] != expected[0] or not same:
-                sys.exit(f"{what}, {results}, {options}: answers differ")
+                sys.exit(f"{what}, {results}, {options}: results differ")
             if detector.stats["gpu_fallbacks"]:
                 sys.exit(f"{what}, {results}, {options}: {detector.last_gpu_error}")
     print(what, options, found[0])

@@ -162,7 +162,7 @@ def test_whatever_was_made_of_them_holds_their_memory(how):
 
 
 @pytest.mark.skipif("PYTEST_XDIST_WORKER" in os.environ, reason="memory of the whole device: without -n")
-def test_memory_of_dropped_answers_is_taken_again():
+def test_memory_of_dropped_results_is_taken_again():
     scene, t0, t1 = crumpled()
     detector = settled(scene, t0, t1)
     first = address(detector.detect(t0, t1).vf)
@@ -174,7 +174,7 @@ def test_memory_of_dropped_answers_is_taken_again():
     assert len(sizes) == 1 and abs(free[10] - free[-1]) < 4 << 20
 
 
-def test_who_writes_into_them_harms_no_later_answer():
+def test_who_writes_into_them_harms_no_later_result():
     scene, t0, t1 = crumpled()
     expected = hc.Detector(scene, backend="cpu").detect(t0, t1)
     detector = settled(scene, t0, t1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far a motion may go, asked of the GPU: bit for bit what the CPU answers, whatever was asked before."""
+"""How far a motion may go, asked of the GPU: bit-identical to the result of the CPU, whatever was asked before."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Failures where answers stay on the device: of arrays on streams, steps, places, sorted rows, and of all memory."""
+"""Failures where results stay on the device: of arrays on streams, steps, places, sorted rows, and of all memory."""
 
 import os
 
@@ -74,7 +74,7 @@ def test_every_call_may_fail_with_arrays_on_a_stream(name):
     assert 30 < failures < 599
 
 
-def test_a_held_answer_survives_the_failures_that_follow():
+def test_a_held_result_survives_the_failures_that_follow():
     scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(2), 12)])
     cpu = hc.Detector(scene, backend="cpu")
     expected, back = cpu.detect(t0, t1), cpu.detect(t1, t0)
@@ -90,14 +90,14 @@ def test_a_held_answer_survives_the_failures_that_follow():
     assert_same(held, expected)
 
 
-def test_a_step_that_fails_is_answered_or_rejected_and_the_next_are_right():
+def test_a_step_that_fails_is_processed_or_rejected_and_the_next_are_right():
     """Keeping the last positions may fail as well: then RuntimeError says so, and stepping begins again."""
     scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(3), 10)])
     cpu = hc.Detector(scene, backend="cpu")
     expected = cpu.detect(t0, t1)
     given = [cupy.asarray(t) for t in (t0, t1)]
     detector = hc.Detector(scene, backend="gpu", threads=2, results="device")
-    answered = rejected = 0
+    processed = rejected = 0
     for n in range(1, 80):
         detector.reset()
         detector.step(given[0])
@@ -106,7 +106,7 @@ def test_a_step_that_fails_is_answered_or_rejected_and_the_next_are_right():
             found = detector.step(given[1])
             _core.gpu_fail_after(0)
             assert_same(found, expected)
-            answered += 1
+            processed += 1
         except RuntimeError as error:
             _core.gpu_fail_after(0)
             assert "asked for by a test" in str(error)
@@ -114,7 +114,7 @@ def test_a_step_that_fails_is_answered_or_rejected_and_the_next_are_right():
         detector.reset()
         detector.step(given[0])
         assert_same(detector.step(given[1]), expected)
-    assert answered > 20 and rejected < 10
+    assert processed > 20 and rejected < 10
 
 
 def test_bad_coordinates_between_failures():
@@ -181,7 +181,7 @@ def all_memory():
 @pytest.mark.skipif("PYTEST_XDIST_WORKER" in os.environ, reason="takes all memory: not beside other tests; without -n")
 @pytest.mark.parametrize("results", ("host", "device"))
 @pytest.mark.parametrize("worlds", (None, 8))
-def test_without_memory_the_cpu_answers_and_says_why_where_it_cannot(worlds, results):
+def test_without_memory_the_cpu_results_and_says_why_where_it_cannot(worlds, results):
     scene, t0, t1 = garments(8, n=30) if worlds else scenes.join([scenes.crumpled(np.random.default_rng(4), 60)])
     expected = hc.Detector(scene, backend="cpu", worlds=worlds).detect(t0, t1)
     detector = hc.Detector(scene, backend="gpu", results=results, worlds=worlds)
@@ -190,7 +190,7 @@ def test_without_memory_the_cpu_answers_and_says_why_where_it_cannot(worlds, res
     try:
         assert_same(detector.detect(t0, t1), expected)
         assert detector.stats["gpu_fallbacks"] in (0, 1)
-    except RuntimeError as error:  # not even room for the answer
+    except RuntimeError as error:  # not even room for the result
         assert results == "device" and "memory" in str(error)
     finally:
         taken.clear()

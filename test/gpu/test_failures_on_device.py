@@ -26,8 +26,8 @@ def sheet(options):
     return scenes.join([scenes.crumpled(np.random.default_rng(1), 14)])
 
 
-def answer_with_failure(n, detector, ask):
-    """The answer where the n-th call fails, or None where not even the CPU's could be brought to the device."""
+def result_with_failure(n, detector, ask):
+    """The result where the n-th call fails, or None where not even the CPU's could be brought to the device."""
     _core.gpu_fail_after(n)
     try:
         return ask(detector)
@@ -61,8 +61,8 @@ def test_every_call_may_fail(options, query):
     failures = 0
     for n in range(1, 500):
         detector = hc.Detector(scene, backend="gpu", threads=2, **options)
-        found = answer_with_failure(n, detector, ask)
-        assert found is not None, f"call {n}: one failure is no reason not to answer"
+        found = result_with_failure(n, detector, ask)
+        assert found is not None, f"call {n}: one failure is no reason to return nothing"
         assert_same(found, expected)
         if not detector.stats["gpu_fallbacks"]:
             break
@@ -81,7 +81,7 @@ def test_failures_of_a_warm_detector_leak_nothing():
     free = []
     for _ in range(4):
         for n in range(1, 60):
-            assert_same(answer_with_failure(n, detector, lambda d: d.detect(t0, t1)), expected)
+            assert_same(result_with_failure(n, detector, lambda d: d.detect(t0, t1)), expected)
             assert_same(detector.detect(t0, t1), expected)
         cupy.cuda.Device().synchronize()
         free.append(cupy.cuda.runtime.memGetInfo()[0])

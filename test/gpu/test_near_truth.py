@@ -66,7 +66,7 @@ def test_proximity_and_intersections(data_folder, name):
 
 @pytest.mark.parametrize("distance", (1e-4, 1e-3))
 def test_many_bodies(data_folder, distance):
-    """No truth of its own: the CPU's answer, which tests of its own compare with integers."""
+    """No truth of its own: the CPU's result, which tests of its own compare with integers."""
     data = np.load(data_folder / "n-body.npz")
     scene = hc.Scene()
     scene.add_mesh("scene", data["faces"], n_vertices=len(data["vertices_t0"]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""results="device": the CPU's answers, in arrays that CuPy and PyTorch take in place."""
+"""results="device": the CPU's results, in arrays that CuPy and PyTorch take in place."""
 
 import device_results
 import numpy as np
@@ -43,7 +43,7 @@ def test_contacts(accuracy, report, dtype):
         assert_same(here.detect(t0, t1), expected)
 
 
-def test_answers_are_compared_on_the_host():
+def test_results_are_compared_on_the_host():
     scene, t0, t1 = crumpled()
     detector = hc.Detector(scene, backend="gpu", results="device")
     found, again, near = detector.detect(t0, t1), detector.detect(t0, t1), detector.proximity(t0, 0.01)
@@ -131,7 +131,7 @@ def test_arrays_are_taken_in_place_and_held():
     assert_same(last, hc.Detector(scene, backend="cpu").detect(t0, t1))
 
 
-def test_answers_on_the_host_are_held_too():
+def test_results_on_the_host_are_held_too():
     """They lie where the device has written them, a few of them; more are copied."""
     scene, t0, t1 = crumpled()
     expected = hc.Detector(scene, backend="cpu").detect(t0, t1)

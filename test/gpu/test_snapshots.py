@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Queries of one snapshot: the GPU answers what the CPU answers, to the last bit."""
+"""Queries of one snapshot: the results of the GPU are bit-identical to those of the CPU."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Streams of the caller and streaming steps, with answers that stay on the device."""
+"""Streams of the caller and streaming steps, with results that stay on the device."""
 
 import os
 import subprocess
@@ -92,7 +92,7 @@ def test_streams_of_torch_and_the_default_ones():
 @pytest.mark.parametrize("given", ("no stream", "stream"))
 @pytest.mark.parametrize("where", ("device", "host"))
 def test_memory_still_read_on_the_callers_stream_is_not_written(spin, where, given):
-    """An answer is dropped while a stream is about to read it: the next call may write there when that has ended."""
+    """A result is dropped while a stream is about to read it: the next call may write there when that has ended."""
     scene, t0, t1 = crumpled()
     expected = hc.Detector(scene, backend="cpu").detect(t0, t1)
     detector = hc.Detector(scene, backend="gpu", results="device")
@@ -161,7 +161,7 @@ def test_steps_whose_array_the_caller_writes_anew():
 
 
 def test_one_detector_asked_by_several_threads():
-    """Each waits for the one before; nobody's answer is another's, whoever looks at the counts meanwhile."""
+    """Each waits for the one before; nobody's result is another's, whoever looks at the counts meanwhile."""
     scene, t0, t1 = crumpled(14)
     motions = [(t0, t1), (t1, t0), (t0, t0 + 0.3 * (t1 - t0))]
     cpu = hc.Detector(scene, backend="cpu")

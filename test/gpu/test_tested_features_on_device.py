@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Option features on GPUs: bit for bit what the CPU answers, whatever is left out, and edges cost nothing then."""
+"""Option features on GPUs: bit-identical to the CPU, whatever is left out; edges then cost nothing."""
 
 import itertools
 

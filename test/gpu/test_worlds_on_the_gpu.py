@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every world of a frame on the GPU is the answer of a CPU's detector of its own, whatever stands in the others."""
+"""Every world of a frame on the GPU is the result of a CPU's detector of its own, whatever stands in the others."""
 
 import device_results
 import numpy as np

@@ -34,7 +34,7 @@ def test_a_node_with_results(start_node, hpccd):
     for mesh in ("cloth", "floor"):
         node.peer.topology(mesh, sheet_faces(N), N * N)
     node.peer.vertices("floor", sheet_positions(N, 0) - [0, 0, 5], 0)
-    node.frames_status(answered=1)
+    node.frames_status(processed=1)
     for k in range(3):
         node.peer.vertices("cloth", sheet_positions(N, k), 1_500_000_000 + k)
         node.contacts(k)

@@ -28,8 +28,8 @@ LOOPBACK = """
 
 
 def play(node, folder, faces, frames):
-    """Let the peer stream ``frames``; the answers as messages."""
-    source, target = folder / "frames.npz", folder / "answers.json"
+    """Let the peer stream ``frames``; the results as messages."""
+    source, target = folder / "frames.npz", folder / "results.json"
     np.savez(source, faces=faces, frames=frames)
     peer = subprocess.run(
         [sys.executable, str(SUPPORT / "cyclone_peer.py"), node.namespace, str(source), str(target)],
@@ -53,15 +53,15 @@ def test_peer_gets_the_contacts_of_the_core(start_node, tmp_path, dtype):
     n, outputs, apart = 16, ("points", "normals"), 1e-5
     node = start_node({"meshes": ["cloth"], "outputs": list(outputs), "pair_separation": [f"cloth:cloth:{apart}"]})
     frames = np.stack([sheet_positions(n, k, dtype=dtype) for k in range(6)])
-    answers = play(node, tmp_path, sheet_faces(n), frames)
-    assert_all_but_one(answers, frames, sheet_faces(n), outputs=outputs, minimum_separation=apart)
-    assert answers[0].step == 1, "answers that fit one datagram are not lost"
-    for answer in answers:
-        assert len(answer.points) == len(answer.normals) == 3 * answer.total
-        assert (answer.header.frame_id, list(answer.mesh_names)) == ("lab", ["cloth"])
-        assert list(answer.topology_versions) == [3]
-        assert (answer.minimum_separation, list(answer.separations)) == (0.0, [apart])
-    node.frames_status(received=6, answered=6, dropped=0)
+    results = play(node, tmp_path, sheet_faces(n), frames)
+    assert_all_but_one(results, frames, sheet_faces(n), outputs=outputs, minimum_separation=apart)
+    assert results[0].step == 1, "results that fit one datagram are not lost"
+    for result in results:
+        assert len(result.points) == len(result.normals) == 3 * result.total
+        assert (result.header.frame_id, list(result.mesh_names)) == ("lab", ["cloth"])
+        assert list(result.topology_versions) == [3]
+        assert (result.minimum_separation, list(result.separations)) == (0.0, [apart])
+    node.frames_status(received=6, processed=6, dropped=0)
 
 
 def test_large_messages_cross_over_udp(start_node, tmp_path):
@@ -69,9 +69,9 @@ def test_large_messages_cross_over_udp(start_node, tmp_path):
     n, tier = 100, "balanced"  # nearly every contact is degenerate: exact takes seconds, and this is not about it
     node = start_node({"meshes": ["cloth"], "max_contacts": 0, "accuracy": tier})
     frames = np.stack([sheet_positions(n, k) for k in (2, 3, 4)])
-    answers = play(node, tmp_path, sheet_faces(n), frames)
-    assert_all_but_one(answers, frames, sheet_faces(n), accuracy=tier)
-    assert answers[-1].total > 100_000
+    results = play(node, tmp_path, sheet_faces(n), frames)
+    assert_all_but_one(results, frames, sheet_faces(n), accuracy=tier)
+    assert results[-1].total > 100_000
 
 
 STRANGER = """
@@ -100,14 +100,14 @@ def test_a_topic_that_ros_could_not_name_is_passed_over(start_node):
         stranger.stdin.close()
 
 
-def assert_all_but_one(answers, frames, faces, **options):
-    """Every answer equals the core's, and at most one is missing.
+def assert_all_but_one(results, frames, faces, **options):
+    """Every result equals the core's, and at most one is missing.
 
     Cyclone's reader takes what was written before the first heartbeat that it hears for older than itself. Fast DDS
-    sends the first one among the fragments of the first answer that has more than one: that answer is passed over.
+    sends the first one among the fragments of the first result that has more than one: that result is passed over.
     """
-    assert len({answer.step for answer in answers}) == len(answers) >= len(frames) - 2
-    for answer in answers:
-        end = answer.step
-        assert (answer.start.nanosec, answer.header.stamp.nanosec) == (end, end + 1)
-        assert assert_same_contacts(answer, frames[end - 1], frames[end], scene_of(cloth=faces), **options) > 100
+    assert len({result.step for result in results}) == len(results) >= len(frames) - 2
+    for result in results:
+        end = result.step
+        assert (result.start.nanosec, result.header.stamp.nanosec) == (end, end + 1)
+        assert assert_same_contacts(result, frames[end - 1], frames[end], scene_of(cloth=faces), **options) > 100

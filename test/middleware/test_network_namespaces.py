@@ -23,7 +23,7 @@ import hpccd_core as hc
 import hpccd_ros
 
 HERE, THERE = "10.213.77.1", "10.213.77.2"
-# The open network answers within a second or two: what has not answered after this is closed.
+# The open network responds within a second or two: what has not responded after this is closed.
 CLOSED = 5.0  # s
 SWITCH = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
@@ -109,27 +109,27 @@ def node_in(networks, tmp_path):
         node.communicate(timeout=PATIENCE)
 
 
-def assert_contacts_of_the_core(answer):
+def assert_contacts_of_the_core(response):
     # Frames before the two were known to each other are lost, and a busy machine may pass over others.
-    assert answer["start"] < answer["step"]
+    assert response["start"] < response["step"]
     expected = hc.Detector(scene_of(cloth=sheet_faces(N))).detect(
-        *(sheet_positions(N, answer[end]) for end in ("start", "step"))
+        *(sheet_positions(N, response[end]) for end in ("start", "step"))
     )
-    assert answer["hash"] == expected.hash and answer["total"] == len(expected) > 100
+    assert response["hash"] == expected.hash and response["total"] == len(expected) > 100
 
 
 def test_open_discovery_reaches_the_node_over_udp(networks, node_in):
     node_in("/open", **{SWITCH: "SUBNET"})
     got = ask(networks[1], "/open", PATIENCE, **{SWITCH: "SUBNET"})
-    assert got["answer"] is not None, got
-    assert_contacts_of_the_core(got["answer"])
+    assert got["response"] is not None, got
+    assert_contacts_of_the_core(got["response"])
 
 
 def test_default_is_closed_to_the_network_and_open_to_its_host(networks, node_in):
     node = node_in("/closed", **{SWITCH: ""})
     # Even one who knows the address of the node, and names it, finds nobody.
     got = ask(networks[1], "/closed", CLOSED, **{SWITCH: "SUBNET", "ROS_STATIC_PEERS": HERE})
-    assert got == {"answer": None, "listeners": 0}
+    assert got == {"response": None, "listeners": 0}
     got = ask(node, "/closed", PATIENCE, **{SWITCH: ""})
-    assert got["answer"] is not None, got
-    assert_contacts_of_the_core(got["answer"])
+    assert got["response"] is not None, got
+    assert_contacts_of_the_core(got["response"])

@@ -65,8 +65,8 @@ def test_overrides_are_in_force_on_every_topic(start_node, tmp_path):
     assert output.count(" is unknown and has no effect") == 2
     assert f"parameter qos_overrides.{node.namespace}/nothing.subscription.depth is unknown" in output
     name = f"qos_overrides.{node.namespace}/contacts.publisher.reliability"
-    answer = call(node, GetParameters, "get_parameters", GetParameters.Request(names=[name]))
-    assert answer.values[0].string_value == "best_effort"
+    response = call(node, GetParameters, "get_parameters", GetParameters.Request(names=[name]))
+    assert response.values[0].string_value == "best_effort"
     assert not set_parameter(node, name, "reliable").successful, "read at the start"
 
 
@@ -92,10 +92,10 @@ def test_the_recording_hears_what_the_node_hears(start_node, tmp_path):
         node.wait_until(lambda again=again: frames_received(node) or time.monotonic() > again, "the first frame")
     for k in range(1, 4):
         node.peer.vertices("cloth", sheet_positions(N, k), k)
-        node.wait_until(lambda k=k: len(heard) >= k, f"answer {k}")
+        node.wait_until(lambda k=k: len(heard) >= k, f"response {k}")
     assert node.stop() == 0
     recorded = int(re.search(r"recorded ([\d,]+) messages", node.output())[1].replace(",", ""))
-    assert recorded >= 8, "a topology, four frames, three answers"
+    assert recorded >= 8, "a topology, four frames, three responses"
     done = subprocess.run(
         [sys.executable, "-m", "hpccd_ros.cli", "replay", str(bag)], capture_output=True, text=True, timeout=PATIENCE
     )

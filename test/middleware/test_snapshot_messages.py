@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Answers about one snapshot, and the separation in force, as messages."""
+"""Results about one snapshot, and the separation in force, as messages."""
 
 import dataclasses
 import math
@@ -11,7 +11,7 @@ from hpccd.msg import ContactArray, DistanceArray
 import hpccd_core as hc
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NONE, Separation
-from hpccd_ros.middleware import answer_fields, contact_messages, snapshot_messages
+from hpccd_ros.middleware import contact_messages, result_fields, snapshot_messages
 
 LAYOUT = Layout(("cloth", "ball", "floor"), np.array([0, 10, 14, 20]), np.array([0, 8, 12, 20]), (3, 0, 9))
 UNUSED = ContactArray.NONE
@@ -113,9 +113,9 @@ SEPARATION = Separation(1e-3, (("floor", "cloth", 0.5), ("ball", "ball", 0.0)))
 @pytest.mark.parametrize("separation", [NONE, SEPARATION])
 def test_separation_comes_back(separation):
     message = ContactArray(mesh_names=["cloth", "ball", "floor"])
-    answer_fields.fill_separation(message, separation)
+    result_fields.fill_separation(message, separation)
     assert message.minimum_separation == separation.minimum
-    assert answer_fields.read_separation(message) == separation
+    assert result_fields.read_separation(message) == separation
 
 
 @pytest.mark.parametrize(
@@ -129,8 +129,8 @@ def test_separation_comes_back(separation):
 )
 def test_separations_that_are_none(changes, text):
     message = ContactArray(mesh_names=["cloth", "ball", "floor"])
-    answer_fields.fill_separation(message, SEPARATION)
+    result_fields.fill_separation(message, SEPARATION)
     for name, value in changes.items():
         setattr(message, name, value)
     with pytest.raises(ValueError, match=text):
-        answer_fields.read_separation(message)
+        result_fields.read_separation(message)

@@ -41,7 +41,7 @@ def test_frames_and_detections():
     report = node.report()
     level, _, values = report["/hpccd: frames"]
     assert level == DiagnosticStatus.OK
-    assert values["received"] == values["answered"] == "3" and values["dropped"] == "0"
+    assert values["received"] == values["processed"] == "3" and values["dropped"] == "0"
     assert float(values["rate_hz.cloth"]) > 0
     assert values["transport_ms.p50"] == "2.00"
     level, _, values = report["/hpccd: detection"]

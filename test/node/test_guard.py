@@ -100,7 +100,7 @@ def test_a_message_that_cannot_be_taken(place):
 
 @pytest.mark.parametrize("callback", [fail, fail_later])
 @pytest.mark.parametrize("kind", [SetParameters, SetParametersAtomically, GetParameters])
-def test_callers_of_a_service_are_answered(place, kind, callback):
+def test_callers_of_a_service_get_a_response(place, kind, callback):
     place.node.create_service(kind, "bad", callback)
     client = place.node.create_client(kind, "bad")
     place.until(client.service_is_ready)
@@ -110,12 +110,12 @@ def test_callers_of_a_service_are_answered(place, kind, callback):
     for _ in range(2):
         future = client.call_async(request)
         place.until(future.done)
-        answer = future.result()
+        response = future.result()
         if kind is SetParameters:
-            results = [(result.successful, result.reason) for result in answer.results]
+            results = [(result.successful, result.reason) for result in response.results]
             assert results == [(False, "bad: LookupError: on purpose")] * 2
         if kind is SetParametersAtomically:
-            assert not answer.result.successful and "on purpose" in answer.result.reason
+            assert not response.result.successful and "on purpose" in response.result.reason
     assert place.errors.count == 2 and len(place.log) == 1
 
 
@@ -156,18 +156,18 @@ def test_a_node_with_faults_goes_on(start_node):
     node.wait_until(lambda: told("LookupError: timer") > first + 10, "more of them")
     assert node.output().count("Traceback") == 1, "the same error is logged once"
 
-    answer = call(node, SetParametersAtomically, "fail", SetParametersAtomically.Request()).result
-    assert not answer.successful and "LookupError: request" in answer.reason
+    response = call(node, SetParametersAtomically, "fail", SetParametersAtomically.Request()).result
+    assert not response.successful and "LookupError: request" in response.reason
     rejected = set_parameter(node, "markers_max", 7)
     assert not rejected.successful and "LookupError: parameter" in rejected.reason
 
     node.peer.topology("cloth", sheet_faces(N), N * N)
     stream(node, range(2))
     node.peer.vertices("cloth", sheet_positions(N, 2), 2)
-    node.frames_status(dropped__detection_failed=1, answered=2, waiting=0)
+    node.frames_status(dropped__detection_failed=1, processed=2, waiting=0)
     node.wait_until(lambda: "LookupError: detection thread" in node.output(), "error of the detection thread")
     node.peer.vertices("cloth", sheet_positions(N, 3), 3)
-    node.frames_status(received=4, answered=3, waiting=0)
+    node.frames_status(received=4, processed=3, waiting=0)
 
     assert change_state(node, Transition.TRANSITION_DEACTIVATE)
     assert not change_state(node, Transition.TRANSITION_ACTIVATE)

@@ -114,7 +114,7 @@ FILES = {
         "robot.r.description and robot.r.joint_states: both use the topic /robot_description, the first as "
         "std_msgs/msg/String, the second as sensor_msgs/msg/JointState; give each a topic of its own",
     ),
-    "joint-states-on-answers": (
+    "joint-states-on-results": (
         HEAD + ROBOT + "joint_states: contacts}\n",
         2,
         "and robot.r.joint_states: both use the topic /contacts",

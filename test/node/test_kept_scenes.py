@@ -27,7 +27,7 @@ def request(step, query="collision_free_step"):
     return out
 
 
-def answer(kept, asked, cancellation=None):
+def response(kept, asked, cancellation=None):
     return compute(asked, NodeScene(BUILDER, {}), OPTIONS, LIMITS, kept, cancellation or Cancellation())
 
 
@@ -38,17 +38,17 @@ def detector_in(kept):
     return used
 
 
-def test_requests_of_any_kind_share_a_detector_and_answer_as_a_new_one():
+def test_requests_of_any_kind_share_a_detector_and_response_as_a_new_one():
     kept = KeptDetectors(2)
-    answer(kept, request(0))
+    response(kept, request(0))
     first = detector_in(kept)
     assert first is not None
     for step in range(4):
         positions = [sheet_positions(N, k) for k in (step, step + 1)]
         new = hc.Detector(scene_of(cloth=FACES))
-        assert answer(kept, request(step)).collision_free_step == new.collision_free_step(*positions)
-        assert answer(kept, request(step, "contacts")).contacts.hash == new.detect(*positions).hash
-        distances = answer(kept, request(step, "distances")).distances.distance
+        assert response(kept, request(step)).collision_free_step == new.collision_free_step(*positions)
+        assert response(kept, request(step, "contacts")).contacts.hash == new.detect(*positions).hash
+        distances = response(kept, request(step, "distances")).distances.distance
         assert np.array_equal(distances, [gap.distance for gap in new.distances(positions[1])])
         assert detector_in(kept) is first
 
@@ -57,25 +57,25 @@ def test_a_request_that_was_given_up_leaves_nothing():
     kept, given_up = KeptDetectors(2), Cancellation()
     given_up.cancel()
     with pytest.raises(hc.Cancelled):
-        answer(kept, request(0), given_up)
+        response(kept, request(0), given_up)
     assert detector_in(kept) is None
-    answer(kept, request(0))
+    response(kept, request(0))
     assert detector_in(kept) is not None
 
 
-def test_a_request_given_up_after_its_answer_spoils_nothing():
+def test_a_request_given_up_after_its_response_spoils_nothing():
     kept, late = KeptDetectors(2), Cancellation()
-    expected = answer(kept, request(0), late).collision_free_step
+    expected = response(kept, request(0), late).collision_free_step
     late.cancel()
-    assert answer(kept, request(0)).collision_free_step == expected
+    assert response(kept, request(0)).collision_free_step == expected
 
 
 def test_a_rejected_request_leaves_what_others_left():
     kept = KeptDetectors(2)
-    answer(kept, request(0))
+    response(kept, request(0))
     first = detector_in(kept)
     wrong = request(0)
     wrong.end[0].vertices_f32 = wrong.end[0].vertices_f32[:-3]
     with pytest.raises(ValueError, match="end"):
-        answer(kept, wrong)
+        response(kept, wrong)
     assert detector_in(kept) is first

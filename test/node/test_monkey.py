@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whatever a node is asked, in whatever state and order, while frames stream: it answers, goes on and has counted all.
+"""Requests of every kind, in any state and order, while frames stream: the node responds, goes on and counts all.
 
 Ten seconds, a minute with --long. HPCCD_MONKEY_CALLS=10000 sets a number of calls instead; HPCCD_MONKEY_SEED=2 a seed.
 """
@@ -40,18 +40,18 @@ SERVICES = set(
     "set_parameters_atomically".split()
 )
 VERSION = 7  # of the topologies in the end
-# s, far more than any time limit that was set. An answer sent right before a clean-up may get lost on a busy machine,
+# s, far more than any time limit that was set. A response sent right before a clean-up may get lost on a busy machine,
 # as the service that sent it is gone: it is then one of few, and counted by the node as any other.
 TOO_LATE = 60.0
 
 
 class Caller:
-    """Clients of all services that the node offers; what was asked and answered, by service."""
+    """Clients of all services that the node offers; what was requested and returned, by service."""
 
     def __init__(self, node):
         self.node = node
         self._under_way = []
-        self.asked, self.answered = Counter(), Counter()
+        self.asked, self.returned = Counter(), Counter()
         self.kinds = node.wait_until(self._offered, "services of the node")
         self._clients = {
             name: node.peer.node.create_client(kind, f"hpccd/{name}", qos_profile=QoSProfile(depth=200))
@@ -72,30 +72,30 @@ class Caller:
         return self._clients[name].service_is_ready()
 
     def ask(self, name, request):
-        """Send it; `settle` waits for its answer."""
+        """Send it; `settle` waits for its response."""
         self.asked[name] += 1
         future = self._clients[name].call_async(request)
         self._under_way.append((name, request, future, time.monotonic()))
         return future
 
     def settle(self, most=0):
-        """Wait until at most this many calls are under way; each answer is looked at."""
+        """Wait until at most this many calls are under way; each response is looked at."""
 
         def few():
             done = [call for call in self._under_way if call[2].done()]
             self._under_way = [call for call in self._under_way if not call[2].done()]
             for name, request, future, _ in done:
-                self.answered[name] += 1
-                check_answer(request, future.result())
+                self.returned[name] += 1
+                check_response(request, future.result())
             late = time.monotonic() - TOO_LATE
             self._under_way = [call for call in self._under_way if call[0] != "detect" or call[3] > late]
             return len(self._under_way) <= most
 
-        self.node.wait_until(few, f"answers of {Counter(name for name, *_ in self._under_way)}")
+        self.node.wait_until(few, f"responses of {Counter(name for name, *_ in self._under_way)}")
 
     def now(self, name, request):
         future = self.ask(name, request)
-        self.node.wait_until(future.done, f"answer of {name}")
+        self.node.wait_until(future.done, f"response of {name}")
         return future.result()
 
     def state(self):
@@ -105,16 +105,18 @@ class Caller:
         return self.now("change_state", ChangeState.Request(transition=transition)).success
 
 
-def check_answer(request, answer):
+def check_response(request, response):
     """It says why, where it rejects."""
     if isinstance(request, SetParameters.Request):
-        assert len(answer.results) == len(request.parameters)
-        assert all(result.successful or result.reason for result in answer.results), request
+        assert len(response.results) == len(request.parameters)
+        assert all(result.successful or result.reason for result in response.results), request
     elif isinstance(request, SetParametersAtomically.Request):
-        assert answer.result.successful or answer.result.reason, request
+        assert response.result.successful or response.result.reason, request
     elif isinstance(request, Detect.Request):
-        answered = answer.contacts.backend + answer.distances.backend or not math.isnan(answer.collision_free_step)
-        assert answer.message and answer.success == bool(answered), answer.message
+        computed = response.contacts.backend + response.distances.backend or not math.isnan(
+            response.collision_free_step
+        )
+        assert response.message and response.success == bool(computed), response.message
 
 
 class Streamer(threading.Thread):
@@ -225,21 +227,23 @@ def test_anything_in_any_order(start_node, tmp_path, seconds):
 
     assert caller.now("detect", Detect.Request()).message
     caller.settle()
-    ends = {"answered", "rejected", "busy", "timed_out", "failed", "stopped", "canceled"}
+    ends = {"succeeded", "rejected", "busy", "timed_out", "failed", "stopped", "canceled"}
 
     def counted():
         values = node.peer.statuses.get("service", (b"", "", {}))[2]
         return values if sum(int(values.get(name, 0)) for name in ends) == caller.asked["detect"] else None
 
     service = node.wait_until(counted, f"count of all {caller.asked['detect']} requests")
-    lost = caller.asked["detect"] - caller.answered["detect"]
+    lost = caller.asked["detect"] - caller.returned["detect"]
     assert lost <= 1 + calls / 1000
     frames_values = node.frames_status(waiting=0)
-    numbers = {key: int(frames_values.get(key, 0)) for key in ("received", "answered", "dropped", "dropped.middleware")}
+    numbers = {
+        key: int(frames_values.get(key, 0)) for key in ("received", "processed", "dropped", "dropped.middleware")
+    }
     # To be seen with pytest -s.
-    print(f"{calls} calls: {dict(caller.asked)}, {lost} answers lost; {service}; {frames_values}")
-    assert numbers["received"] + numbers["dropped.middleware"] == numbers["answered"] + numbers["dropped"]
-    assert int(service["answered"]) > 0 and numbers["answered"] > 0
+    print(f"{calls} calls: {dict(caller.asked)}, {lost} responses lost; {service}; {frames_values}")
+    assert numbers["received"] + numbers["dropped.middleware"] == numbers["processed"] + numbers["dropped"]
+    assert int(service["succeeded"]) > 0 and numbers["processed"] > 0
     level, text, _ = node.peer.statuses["errors"]
     assert level == b"\0", f"{text}\n{node.output()}"
 

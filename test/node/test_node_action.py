@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The action ~/detect over DDS: the service's answers, feedback, cancelling, and what strangers may do to it."""
+"""The action ~/detect over DDS: the service's responses, feedback, cancelling, and what strangers may do to it."""
 
 import resource
 import signal
@@ -35,7 +35,7 @@ def fields_of(definition, place):
     return [line for line in part.splitlines() if line and not line.startswith("#")]
 
 
-def test_the_action_asks_and_answers_what_the_service_does():
+def test_the_action_asks_and_responses_what_the_service_does():
     for part in (0, 1):
         assert fields_of(ROOT / "action/Detect.action", part) == fields_of(ROOT / "srv/Detect.srv", part)
 
@@ -51,7 +51,7 @@ def service_status(node, **expected):
 
 def of_service(node, asked):
     future = node.peer.client().call_async(asked)
-    node.wait_until(future.done, "answer of the service")
+    node.wait_until(future.done, "response of the service")
     return future.result()
 
 
@@ -85,7 +85,7 @@ def node(start_node):
     ],
     ids="contacts first separation step proximity intersections distances".split(),
 )
-def test_the_result_is_the_answer_of_the_service(node, asked):
+def test_the_result_is_the_response_of_the_service(node, asked):
     response = of_service(node, asked)
     assert response.success, response.message
     status, result = Goals(node).send(asked).ended()
@@ -142,7 +142,7 @@ def test_cancelling_ends_the_computation(start_node):
     node.wait_until(lambda: "detecting" in goal.stages, "the goal under way")
     assert goal.cancel() == 1
     assert_canceled(goal)
-    service_status(node, open=0, canceled=1, answered=0)
+    service_status(node, open=0, canceled=1, succeeded=0)
     used = cpu_seconds(node.process) - before
     assert step_needs_more_than(used), f"{used:.1f} s of a core were used: it was not ended"
     assert goal.cancel() == 0, "ended goals cannot be canceled"
@@ -171,7 +171,7 @@ def test_bad_goals_are_aborted_with_a_reason(node, bad, text):
     assert status == ABORTED and not result.success and text in result.message, result.message
     assert len(result.contacts.toc) == 0 and len(result.message) < 1200
     assert good.ended()[0] == SUCCEEDED, "the node goes on"
-    service_status(node, open=0, answered=1)
+    service_status(node, open=0, succeeded=1)
 
 
 def test_late_goals_are_aborted(node):
@@ -192,19 +192,19 @@ def test_goals_and_requests_share_the_places(start_node):
     assert status == ABORTED and result.message.startswith("busy: 2 requests")
     running.cancel()
     assert waiting.ended()[0] == SUCCEEDED
-    service_status(node, open=0, busy=2, canceled=1, answered=1)
+    service_status(node, open=0, busy=2, canceled=1, succeeded=1)
 
 
 def test_every_goal_of_a_burst_ends(start_node):
     node = start_node({**ONE_AT_A_TIME, "detect_waiting": 2})
-    # The client's own queues hold ten answers: it sends no more at once.
+    # The client's own queues hold ten responses: it sends no more at once.
     ends = []
     for _ in range(6):
         ends += [goal.ended() for goal in Goals(node).send_all([request(n=3) for _ in range(10)])]
     good = sum(status == SUCCEEDED and result.success for status, result in ends)
     busy = sum(status == ABORTED and result.message.startswith("busy: 3 requests") for status, result in ends)
     assert good >= 18 and good + busy == 60
-    service_status(node, open=0, answered=good, busy=busy)
+    service_status(node, open=0, succeeded=good, busy=busy)
 
 
 def test_two_clients(node):
@@ -278,14 +278,14 @@ def test_stray_requests_to_the_action(start_node):
     stranger.goal_id.uuid = list(range(16))
     assert call(node, impl.GetResultService, "detect/_action/get_result", stranger).status == GoalStatus.STATUS_UNKNOWN
     unknown = CancelGoal.Request(goal_info=GoalInfo(goal_id=stranger.goal_id))
-    answer = call(node, CancelGoal, "detect/_action/cancel_goal", unknown)
-    assert (answer.return_code, answer.goals_canceling) == (CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID, [])
+    response = call(node, CancelGoal, "detect/_action/cancel_goal", unknown)
+    assert (response.return_code, response.goals_canceling) == (CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID, [])
     sent = impl.SendGoalService.Request(goal=client.goal_from_request(endless()), goal_id=stranger.goal_id)
     accepted = [call(node, impl.SendGoalService, "detect/_action/send_goal", sent).accepted for _ in range(2)]
     assert accepted == [True, False]
     assert len(call(node, CancelGoal, "detect/_action/cancel_goal", CancelGoal.Request()).goals_canceling) == 1
-    answer = call(node, impl.GetResultService, "detect/_action/get_result", stranger)
-    assert answer.status == CANCELED and answer.result.message.startswith("canceled")
+    response = call(node, impl.GetResultService, "detect/_action/get_result", stranger)
+    assert response.status == CANCELED and response.result.message.startswith("canceled")
     service_status(node, open=0, canceled=1)
     assert node.peer.statuses["errors"][2]["errors"] == "0"
 

@@ -24,7 +24,7 @@ FACES_ONLY, EDGES_ONLY = ("vertex_face",), ("edge_edge",)
 
 
 class Stream:
-    """Frames of both meshes, each answered before the next is sent. pairs: (mesh, mesh, features) of the node."""
+    """Frames of both meshes, each processed before the next is sent. pairs: (mesh, mesh, features) of the node."""
 
     def __init__(self, node, pairs=()):
         self.node, self.pairs, self.sent = node, pairs, 0
@@ -36,22 +36,22 @@ class Stream:
         for name, part in zip(MESHES, positions(self.sent), strict=True):
             self.node.peer.vertices(name, part, stamp=self.sent, frame_id="world")
         self.sent += 1
-        self.node.frames_status(answered=2 * self.sent)
+        self.node.frames_status(processed=2 * self.sent)
         return self.node.contacts(self.sent - 1)[-1] if self.sent > 1 else None
 
     def expect(self, features):
-        """Send a frame; its answer is that of the core, and tells what was tested."""
+        """Send a frame; its result is that of the core, and reports what was tested."""
         scene = scene_of(cloth=FACES, net=FACES)
         for pair in self.pairs:
             scene.set_features(*pair)
-        answer = self.send()
-        assert assert_same_contacts(answer, frame(self.sent - 2), frame(self.sent - 1), scene, features=features) > 0
-        told = client.contacts_from_message(answer)
+        response = self.send()
+        assert assert_same_contacts(response, frame(self.sent - 2), frame(self.sent - 1), scene, features=features) > 0
+        told = client.contacts_from_message(response)
         assert told.features == features
         if not self.pairs:
             assert (told.n_vertex_face > 0) == ("vertex_face" in features)
             assert (told.n_edge_edge > 0) == ("edge_edge" in features)
-        return answer
+        return response
 
     def set(self, name, value):
         return set_parameter(self.node, name, value)
@@ -68,10 +68,10 @@ def test_changed_from_step_to_step_recorded_and_verified(start_node, tmp_path, h
     status = stream.node.peer.statuses["detection"][2]
     assert status["features"] == "vertex_face, edge_edge"
     for bad, reason in (([""], "features: empty"), (["faces"], "use one of vertex_face, edge_edge"), ("x", "type")):
-        answer = stream.set("features", bad)
-        assert not answer.successful and reason in answer.reason, answer.reason
-    answer = stream.set("pair_features", ["cloth:net:vertex_face"])
-    assert not answer.successful and "pair_features: read-only while the node is configured" in answer.reason
+        response = stream.set("features", bad)
+        assert not response.successful and reason in response.reason, response.reason
+    response = stream.set("pair_features", ["cloth:net:vertex_face"])
+    assert not response.successful and "pair_features: read-only while the node is configured" in response.reason
     stream.expect(FEATURES)
     assert stream.node.stop() == 0
     with Recording(path) as recording:
@@ -82,9 +82,9 @@ def test_changed_from_step_to_step_recorded_and_verified(start_node, tmp_path, h
     done = hpccd("replay", path, "--csv", "steps.csv")
     only = "only edge_edge; only vertex_face"
     assert done.returncode == 0, done.stdout + done.stderr
-    assert f"VERIFIED: 5 answers are equal in every contact, time and hash (accuracy exact; {only})" in done.stdout
+    assert f"VERIFIED: 5 responses are equal in every contact, time and hash (accuracy exact; {only})" in done.stdout
     done = hpccd("replay", path, "--features", "vertex_face")
-    assert done.returncode == 1 and "DIVERGED: 4 of 5 answers differ" in done.stdout, done.stdout
+    assert done.returncode == 1 and "DIVERGED: 4 of 5 responses differ" in done.stdout, done.stdout
     done = hpccd("replay", path, "--features", "vertex_face,faces")
     assert done.returncode == 2 and "features: 'faces' is not known; use one of vertex_face" in done.stderr, done.stderr
 
@@ -96,11 +96,11 @@ def test_by_pair_of_meshes_and_only_vertices_against_faces(start_node, tmp_path,
     pairs = [("cloth", "net", EDGES_ONLY), ("net", "net", FACES_ONLY)]
     node = start_node({"meshes": list(MESHES), "record": str(path), **given})
     stream = Stream(node, pairs)
-    answer = stream.expect(FACES_ONLY)
-    kind = np.frombuffer(answer.kind, np.uint8)
-    between = np.frombuffer(answer.mesh_a, np.uint32) != np.frombuffer(answer.mesh_b, np.uint32)
-    assert between.any() and set(kind[between]) == {answer.EDGE_EDGE}
-    assert (kind[~between] == answer.VERTEX_FACE).all()
+    response = stream.expect(FACES_ONLY)
+    kind = np.frombuffer(response.kind, np.uint8)
+    between = np.frombuffer(response.mesh_a, np.uint32) != np.frombuffer(response.mesh_b, np.uint32)
+    assert between.any() and set(kind[between]) == {response.EDGE_EDGE}
+    assert (kind[~between] == response.VERTEX_FACE).all()
     stream.expect(FACES_ONLY)
     assert node.stop() == 0
     with Recording(path) as recording:
@@ -124,8 +124,8 @@ def test_pairs_may_change_while_nothing_is_configured(start_node):
     stream.expect(FEATURES)
     assert change_state(node, Transition.TRANSITION_DEACTIVATE)
     assert change_state(node, Transition.TRANSITION_CLEANUP)
-    answer = stream.set("pair_features", ["cloth:wall:vertex_face"])
-    assert not answer.successful and "'cloth:wall:vertex_face' must be NAME:NAME:KIND" in answer.reason
+    response = stream.set("pair_features", ["cloth:wall:vertex_face"])
+    assert not response.successful and "'cloth:wall:vertex_face' must be NAME:NAME:KIND" in response.reason
     assert stream.set("pair_features", ["cloth:net:vertex_face"]).successful
 
 
@@ -148,7 +148,7 @@ def node(tmp_path_factory):
 def ask(node, asked):
     client = node.peer.client()
     future = client.call_async(asked)
-    node.wait_until(future.done, "answer")
+    node.wait_until(future.done, "response")
     node.peer.node.destroy_client(client)
     return future.result()
 
@@ -163,15 +163,15 @@ def scene_of_node():
 def test_queries_of_features(node, given):
     """What the request says, or the node's parameter; what the node's pairs say holds in any case."""
     tested = given or EDGES_ONLY
-    answer = ask(node, request(features=list(given)))
-    assert answer.success, answer.message
-    assert_same_contacts(answer.contacts, frame(0), frame(1), scene_of_node(), features=tested)
-    assert client.contacts_from_message(answer.contacts).features == tested
+    response = ask(node, request(features=list(given)))
+    assert response.success, response.message
+    assert_same_contacts(response.contacts, frame(0), frame(1), scene_of_node(), features=tested)
+    assert client.contacts_from_message(response.contacts).features == tested
     core = hc.Detector(scene_of_node(), features=tested)
     near = ask(node, request("proximity", distance=[0.004], features=list(given)))
     assert near.success and near.contacts.hash == core.proximity(frame(1), 0.004).hash, near.message
     assert client.contacts_from_message(near.contacts).features == tested
-    for _ in range(2):  # the second is answered by the detector that the first one left
+    for _ in range(2):  # the second is computed by the detector that the first one left
         step = ask(node, request("collision_free_step", features=list(given)))
         assert step.success and step.collision_free_step == core.collision_free_step(frame(0), frame(1))
 
@@ -188,13 +188,13 @@ def test_the_client_asks_for_them(node):
 
 @pytest.mark.parametrize("query", ["intersections", "distances"])
 def test_whole_surfaces_have_none(node, query):
-    answer = ask(node, request(query))
+    response = ask(node, request(query))
     core = hc.Detector(scene_of(cloth=FACES, net=FACES))
-    assert answer.success, answer.message
+    assert response.success, response.message
     if query == "intersections":
-        assert answer.contacts.hash == core.intersections(frame(1)).hash
+        assert response.contacts.hash == core.intersections(frame(1)).hash
     else:
-        got = client.distances_from_message(answer.distances)
+        got = client.distances_from_message(response.distances)
         for gap in core.distances(frame(1)):
             assert got.between(gap.mesh_a, gap.mesh_b) == gap.distance
     rejected = ask(node, request(query, features=["edge_edge"]))
@@ -204,7 +204,7 @@ def test_whole_surfaces_have_none(node, query):
 
 @pytest.mark.parametrize("features", [["faces"], [""], ["vertex_face", "x" * 1_000_000]], ids=["word", "empty", "1MB"])
 def test_bad_names_are_rejected(node, features):
-    answer = ask(node, request(features=features))
-    assert not answer.success and "is not known; use one of vertex_face, edge_edge" in answer.message
-    assert len(answer.message) < 1200
+    response = ask(node, request(features=features))
+    assert not response.success and "is not known; use one of vertex_face, edge_edge" in response.message
+    assert len(response.message) < 1200
     assert ask(node, request()).success, "the node goes on"

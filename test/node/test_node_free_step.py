@@ -55,16 +55,16 @@ def node(tmp_path_factory):
 def ask(node, asked):
     service = node.peer.client()
     future = service.call_async(asked)
-    node.wait_until(future.done, "answer")
+    node.wait_until(future.done, "response")
     node.peer.node.destroy_client(service)
     return future.result()
 
 
 def step_of(node, asked):
-    answer = ask(node, asked)
-    step = client.collision_free_step_from_response(answer)
-    assert answer.message == f"{step!r} of the motion is free of contacts"
-    assert len(answer.contacts.kind) == answer.contacts.total == len(answer.distances.distance) == 0
+    response = ask(node, asked)
+    step = client.collision_free_step_from_response(response)
+    assert response.message == f"{step!r} of the motion is free of contacts"
+    assert len(response.contacts.kind) == response.contacts.total == len(response.distances.distance) == 0
     return step
 
 
@@ -106,7 +106,7 @@ def test_separation_of_the_request(node, distance):
 
 
 def test_separation_of_the_node(start_node):
-    """Also as it changes: what the node keeps of an earlier request must not answer for it."""
+    """Also as it changes: what the node keeps of an earlier request must not stand in for it."""
     node = start_node({"meshes": ["lower", "upper"], "pair_separation": ["lower:upper:0.1"]})
     motion = towards(0.3, 0.7)
     pairs = [("lower", "upper", 0.1)]
@@ -133,14 +133,14 @@ def test_topologies_of_the_node(start_node):
     node = start_node({"meshes": ["lower", "upper"]})
     motion, versions = towards(0.3, 0.7), {"lower": 2, "upper": 5}
     asked = client.collision_free_step_request(*motion, topology_versions=versions)
-    with pytest.raises(RuntimeError, match="the node did not answer: mesh lower: the node has no topology yet"):
+    with pytest.raises(RuntimeError, match="the node computed nothing: mesh lower: the node has no topology yet"):
         client.collision_free_step_from_response(ask(node, asked))
     for name, version in versions.items():
         node.peer.topology(name, FACES, N * N, version=version)
     node.wait_until(lambda: ask(node, asked).success, "topologies")
     assert step_of(node, asked) == core_step(*motion)
-    answer = ask(node, client.collision_free_step_request(*motion))
-    assert not answer.success and "topology_version 0, the topology has version 2" in answer.message
+    response = ask(node, client.collision_free_step_request(*motion))
+    assert not response.success and "topology_version 0, the topology has version 2" in response.message
 
 
 def changed(**fields):
@@ -176,20 +176,20 @@ NAN_VERTEX.start[1].vertices_f64[4] = math.nan
     ids="report any distance nan-separation separation query accuracy limit start end names nan".split(),
 )
 def test_wrong_requests_are_rejected_and_the_node_goes_on(node, asked, text):
-    answer = ask(node, asked)
-    assert not answer.success and text in answer.message, answer.message
-    assert math.isnan(answer.collision_free_step), "no number that a step could be taken by"
+    response = ask(node, asked)
+    assert not response.success and text in response.message, response.message
+    assert math.isnan(response.collision_free_step), "no number that a step could be taken by"
     motion = towards(0.3, 0.7)
     assert step_of(node, request(*motion)) == core_step(*motion)
 
 
 @pytest.mark.parametrize("query", ["contacts", "", "proximity", "intersections", "distances"])
-def test_other_queries_answer_no_step(node, query):
+def test_other_queries_response_no_step(node, query):
     asked = changed(query=query, distance=[0.1] if query == "proximity" else [])
-    answer = ask(node, asked)
-    assert answer.success and math.isnan(answer.collision_free_step), answer.message
-    with pytest.raises(ValueError, match="collision_free_step is nan; it is the answer to query collision_free_step"):
-        client.collision_free_step_from_response(answer)
+    response = ask(node, asked)
+    assert response.success and math.isnan(response.collision_free_step), response.message
+    with pytest.raises(ValueError, match="collision_free_step is nan; it is the result of query collision_free_step"):
+        client.collision_free_step_from_response(response)
 
 
 def test_time_limit(node):
@@ -197,27 +197,27 @@ def test_time_limit(node):
     topology = client.topology_message(sheet_faces(large), large**2)
     motion = [{"cloth": sheet_positions(large, step)} for step in (0, 1)]
     late = client.collision_free_step_request(*motion, topologies={"cloth": topology}, time_limit=1e-4)
-    answer = ask(node, late)
-    assert not answer.success and math.isnan(answer.collision_free_step)
-    assert answer.message == "time limit of 0.0001 s passed before the answer was ready; set a longer time_limit"
+    response = ask(node, late)
+    assert not response.success and math.isnan(response.collision_free_step)
+    assert response.message == "time limit of 0.0001 s passed before the result was ready; set a longer time_limit"
     for _ in range(2):  # what was given up is not used again
         late.time_limit = 0.0
         assert ask(node, late).success
 
 
 def test_requests_at_the_same_time(start_node):
-    """More than the node keeps detectors for, of several scenes: each has its own answer."""
+    """More than the node keeps detectors for, of several scenes: each has its own response."""
     node = start_node({"meshes": ["lower", "upper"], "detect_jobs": 3, "detect_waiting": 40})
     motions = [towards(0.3 + 0.01 * k, 0.7 + 0.02 * k) for k in range(5)]
     separations = (0.0, 0.01, 0.02, 0.05)
     wanted = [(motion, separation) for _ in range(2) for motion in motions for separation in separations]
     service = node.peer.client(depth=len(wanted))
     futures = [service.call_async(request(*motion, minimum_separation=d)) for motion, d in wanted]
-    node.wait_until(lambda: all(future.done() for future in futures), "all answers")
+    node.wait_until(lambda: all(future.done() for future in futures), "all responses")
     for (motion, separation), future in zip(wanted, futures, strict=True):
         step = client.collision_free_step_from_response(future.result())
         assert step == core_step(*motion, minimum_separation=separation)
-    node.wait_until(lambda: node.peer.statuses["service"][2]["answered"] == str(len(wanted)), "count of answers")
+    node.wait_until(lambda: node.peer.statuses["service"][2]["succeeded"] == str(len(wanted)), "count of responses")
 
 
 def test_who_knows_an_older_definition_reads_all_the_rest():

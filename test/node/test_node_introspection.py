@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameter service_introspection: what ~/detect publishes of its requests and answers."""
+"""Parameter service_introspection: what ~/detect publishes of its requests and responses."""
 
 import numpy as np
 from hpccd.srv import Detect
@@ -22,7 +22,7 @@ def ask(node, service):
         end=[client.vertices_message(x, stamp_ns=1) for x in (START - [0, 0, 2], GROUND)],
     )
     future = service.call_async(request)
-    node.wait_until(future.done, "answer")
+    node.wait_until(future.done, "response")
     assert future.result().success, future.result().message
     return future.result()
 
@@ -45,11 +45,11 @@ def test_events_of_the_service(start_node):
     assert np.array_equal(got.info.client_gid, sent.info.client_gid)
     assert len(got.request) == len(sent.response) == 0, "no contents"
     assert set_parameter(node, "service_introspection", "contents").successful
-    answer = ask(node, service)
+    response = ask(node, service)
     node.wait_until(lambda: len(heard) >= 4, "two more events")
     asked, answered = heard[2].request[0], heard[3].response[0]
     assert list(asked.mesh_names) == ["hand", "table"] and len(asked.end) == 2
-    assert answered.contacts == answer.contacts and answered.contacts.total > 0
+    assert answered.contacts == response.contacts and answered.contacts.total > 0
     rejected = set_parameter(node, "service_introspection", "some")
     assert not rejected.successful and "'some' is not valid; use one of off, metadata, contents" in rejected.reason
     assert set_parameter(node, "service_introspection", "off").successful

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameter contacts_durability: who gets which answers that were sent before it listened."""
+"""Parameter contacts_durability: who gets which results that were sent before it listened."""
 
 import time
 
@@ -16,9 +16,9 @@ from hpccd_ros.middleware import qos
 LATCHED = {"contacts_durability": "transient_local"}
 
 
-def answered(node, answers):
+def with_results(node, results):
     node.peer.topology("cloth", sheet_faces(N), N * N)
-    stream(node, range(answers + 1))
+    stream(node, range(results + 1))
     return node
 
 
@@ -27,22 +27,22 @@ def late(node, profile, wanted):
     heard = []
     subscription = node.peer.node.create_subscription(ContactArray, "contacts", heard.append, profile)
     node.wait_until(lambda: subscription.get_publisher_count(), "the publisher of contacts")
-    node.wait_until(lambda: len(heard) >= wanted, f"{wanted} answers")
+    node.wait_until(lambda: len(heard) >= wanted, f"{wanted} results")
     until = time.monotonic() + 0.5
     node.wait_until(lambda: time.monotonic() > until, "the moment to pass")
     node.peer.node.destroy_subscription(subscription)
     return [message.header.stamp.nanosec for message in heard]
 
 
-def test_the_last_answers_are_kept_for_those_who_ask(start_node):
-    node = answered(start_node({"meshes": ["cloth"], **LATCHED}), 12)
+def test_the_last_results_are_kept_for_those_who_ask(start_node):
+    node = with_results(start_node({"meshes": ["cloth"], **LATCHED}), 12)
     assert late(node, client.LATCHED_CONTACTS_QOS, 10) == list(range(3, 13))
     assert late(node, qos.keep_last(100, latched=True), 10) == list(range(3, 13))
     assert late(node, client.CONTACTS_QOS, 0) == []
 
 
 def test_volatile_is_the_default_and_a_clean_up_takes_what_is_set(start_node):
-    node = answered(start_node({"meshes": ["cloth"]}), 2)
+    node = with_results(start_node({"meshes": ["cloth"]}), 2)
     assert late(node, client.CONTACTS_QOS, 0) == []
     rejected = set_parameter(node, "contacts_durability", "transient_local")
     assert not rejected.successful and "read-only while the node is configured" in rejected.reason
@@ -75,5 +75,5 @@ def test_beside_overrides(start_node, policy, profile, expected):
     node.peer.topology("cloth", sheet_faces(N), N * N)
     for k in range(4):
         node.peer.vertices("cloth", sheet_positions(N, k), k)
-        node.frames_status(answered=k + 1)
+        node.frames_status(processed=k + 1)
     assert late(node, profile, len(expected)) == expected

@@ -136,7 +136,7 @@ def test_life_cycle(start_node):
     assert change_state(node, Transition.TRANSITION_ACTIVATE)
     node.peer.topology("cloth", FACES, N * N)
     stream(node, range(3))
-    node.frames_status(answered=3)
+    node.frames_status(processed=3)
     assert change_state(node, Transition.TRANSITION_DEACTIVATE)
     node.peer.vertices("cloth", sheet_positions(N, 3), 3)  # nobody listens
     assert change_state(node, Transition.TRANSITION_ACTIVATE)
@@ -144,7 +144,7 @@ def test_life_cycle(start_node):
     node.peer.forget_publisher("meshes/cloth/vertices")
     for k in (4, 5):
         node.peer.vertices("cloth", sheet_positions(N, k), k)
-        node.frames_status(answered=k)
+        node.frames_status(processed=k)
     message = node.contacts(3)[2]
     assert fields.stamp_to_ns(message.start) == 4
     assert_same_contacts(message, sheet_positions(N, 4), sheet_positions(N, 5), scene_of(cloth=FACES))
@@ -164,7 +164,7 @@ def label_of(node, label):
 
 
 def test_transitions_that_the_state_does_not_have_are_rejected(start_node):
-    """What is asked for in the wrong state or does not exist at all is answered, and changes nothing."""
+    """What is asked for in the wrong state or does not exist at all gets a response, and changes nothing."""
     node = start_node({"meshes": ["cloth"]})
     node.peer.topology("cloth", FACES, N * N)
     stream(node, range(2))
@@ -231,11 +231,11 @@ def test_scene_is_changed_while_unconfigured(start_node):
             node.peer.forget_publisher(f"meshes/{name}/{kind}")
         node.peer.topology(name, FACES, N * N)
     node.peer.vertices("net", frames[3], 0)
-    node.frames_status(answered=5)
+    node.frames_status(processed=5)
     before = len(node.peer.received)
     for k in (2, 3):
         node.peer.vertices("cloth", frames[k], 10 + k)
-        node.frames_status(answered=4 + k)
+        node.frames_status(processed=4 + k)
     scene = hc.Scene()
     scene.add_mesh("cloth", FACES)
     scene.add_mesh("net", FACES, static=True)
@@ -250,14 +250,14 @@ def test_counts_outlive_a_clean_up(start_node):
     for name in ("cloth", "floor"):
         node.peer.topology(name, FACES, N * N)
     node.peer.vertices("floor", sheet_positions(N, 5), 0)
-    node.frames_status(received=1, answered=1)
+    node.frames_status(received=1, processed=1)
     stream(node, range(3))
-    node.peer.vertices("cloth", sheet_positions(N, 0), 0)  # begins before what was answered
-    node.frames_status(received=5, answered=4, dropped=1)
+    node.peer.vertices("cloth", sheet_positions(N, 0), 0)  # begins before what was processed
+    node.frames_status(received=5, processed=4, dropped=1)
     assert change_state(node, Transition.TRANSITION_DEACTIVATE) and change_state(node, Transition.TRANSITION_CLEANUP)
     node.peer.statuses.clear()
     assert change_state(node, Transition.TRANSITION_CONFIGURE)
-    node.frames_status(received=5, answered=4, dropped=1)
+    node.frames_status(received=5, processed=4, dropped=1)
 
 
 MARKERS_MEANWHILE = """
@@ -272,13 +272,13 @@ sys.exit(run.main(node_type=MarkersMeanwhile))
 
 
 def test_markers_are_asked_for_while_a_step_is_detected(start_node):
-    """That step was detected without the normals that they show: it is answered, once, and not shown."""
+    """That step was detected without the normals that they show: it is processed once, and not shown."""
     node = start_node({"meshes": ["cloth"], "outputs": ["points"]}, program=("-c", MARKERS_MEANWHILE))
     node.peer.topology("cloth", FACES, N * N)
     for k in range(3):
         node.peer.vertices("cloth", sheet_positions(N, k), k)
         values = node.frames_status(received=k + 1, waiting=0)
-        assert values["answered"] == values["received"] and values["dropped"] == "0", node.output()
+        assert values["processed"] == values["received"] and values["dropped"] == "0", node.output()
 
 
 def test_values_of_a_type_that_does_not_exist_are_rejected(start_node):

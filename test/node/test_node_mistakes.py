@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mistakes that users make with the node: each is answered with the problem and its remedy."""
+"""Mistakes that users make with the node: each is reported with the problem and its remedy."""
 
 import itertools
 import json

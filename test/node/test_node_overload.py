@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""More frames than the detection can take: the latest are answered, nothing is lost without being counted."""
+"""More frames than the detection can take: the latest are processed, nothing is lost without being counted."""
 
 import numpy as np
 from lifecycle_msgs.srv import GetState
@@ -24,12 +24,12 @@ def flood(node, count):
 
 
 def settled(node, sent):
-    """The last frame was answered and every frame is accounted for; the frames status."""
+    """The last frame was processed and every frame is accounted for; the frames status."""
 
     def done():
         values = node.peer.statuses["frames"][2]
         lost = int(values.get("dropped.middleware", 0))
-        accounted = int(values["answered"]) + int(values["dropped"])
+        accounted = int(values["processed"]) + int(values["dropped"])
         return values if int(values["received"]) + lost == sent and accounted == sent else None
 
     return node.wait_until(done, f"status with {sent} frames accounted for")
@@ -61,7 +61,7 @@ def test_latest_frames_win_and_drops_are_counted_exactly(start_node):
         assert message.truncated == (len(expected) > 1000)
 
 
-def test_longer_queue_answers_every_frame(start_node):
+def test_longer_queue_results_every_frame(start_node):
     count = 20
     queues = {"frame_queue": 100, "input_depth": 1000}
     node = start_node({"accuracy": TIER, "meshes": ["cloth"], "max_contacts": 1000, **queues})
@@ -83,12 +83,12 @@ def test_two_meshes_count_both_messages_of_a_dropped_frame(start_node):
     values = settled(node, 2 * count)
     assert int(values["dropped.a.overload"]) == int(values["dropped.b.overload"]) > 0
     lost = max(sum(int(n) for key, n in values.items() if key.startswith(f"dropped.{name}.")) for name in "ab")
-    node.wait_until(lambda: node.peer.received and node.peer.received[-1].step == count - 1, "the last answer")
+    node.wait_until(lambda: node.peer.received and node.peer.received[-1].step == count - 1, "the last result")
     assert node.peer.received[-1].dropped_frames == lost, "frames of the scene, not messages"
 
 
 def test_two_hundred_thousand_contacts_a_frame(start_node):
-    """Each frame is answered, cut to the earliest contacts, and the rest of the node stays alive."""
+    """Each frame is processed, cut to the earliest contacts, and the rest of the node stays alive."""
     n, most = 130, 200_000
     faces, there, back = sheet_faces(n), sheet_positions(n, 2), sheet_positions(n, 3)
     frames = [there, back] * 3
@@ -97,14 +97,14 @@ def test_two_hundred_thousand_contacts_a_frame(start_node):
     node.peer.topology("cloth", faces, n * n)
     for k, vertices in enumerate(frames):
         node.peer.vertices("cloth", vertices, stamp=k)
-    client, answers = node.peer.node.create_client(GetState, "hpccd/get_state"), 0
+    client, results = node.peer.node.create_client(GetState, "hpccd/get_state"), 0
     node.wait_until(client.service_is_ready, "service get_state")
     while len(node.peer.received) < len(frames) - 1:
         future = client.call_async(GetState.Request())
-        node.wait_until(future.done, "answer while contacts are computed and sent")
-        answers += 1
-    assert answers > len(frames), "services are answered between the frames, not after them"
-    node.frames_status(answered=len(frames), dropped=0)
+        node.wait_until(future.done, "result while contacts are computed and sent")
+        results += 1
+    assert results > len(frames), "services respond between the frames, not after them"
+    node.frames_status(processed=len(frames), dropped=0)
     detector = hc.Detector(scene_of(cloth=faces), accuracy=TIER)
     both = [detector.detect(there, back), detector.detect(back, there)]
     for k, message in enumerate(node.contacts(len(frames) - 1)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Topic pairs: each pair of meshes in brief, for every answer, where it is asked for."""
+"""Topic pairs: each pair of meshes in brief, for every result, where it is asked for."""
 
 import math
 
@@ -17,7 +17,7 @@ from hpccd_ros.bag.reader import Recording
 
 
 class Stream:
-    """Of both meshes and of one far away, each frame answered before the next is sent."""
+    """Of both meshes and of one far away, each frame processed before the next is sent."""
 
     def __init__(self, node):
         self.node, self.sent, self.heard = node, 0, []
@@ -32,14 +32,14 @@ class Stream:
         for name, part in zip((*MESHES, "far"), (*here, here[0] + np.float32(100)), strict=True):
             self.node.peer.vertices(name, part, stamp=self.sent, step=7 + self.sent, frame_id="world")
         self.sent += 1
-        self.node.frames_status(answered=3 * self.sent)
+        self.node.frames_status(processed=3 * self.sent)
         return self.node.contacts(self.sent - 1)[-1] if self.sent > 1 else None
 
 
 PAIRS = [(a, b) for k, a in enumerate((*MESHES, "far")) for b in (*MESHES, "far")[k:]]
 
 
-def test_every_answer_in_brief(start_node, tmp_path):
+def test_every_result_in_brief(start_node, tmp_path):
     path = tmp_path / "run.mcap"
     node = start_node({"meshes": [*MESHES, "far"], "max_contacts": 1, "record": str(path)})
     stream = Stream(node)

@@ -14,10 +14,10 @@ from hpccd_ros import client
 
 
 def send(node, k):
-    """Frame k of both meshes; the answer, from the second frame on."""
+    """Frame k of both meshes; the response, from the second frame on."""
     for name, part in zip(MESHES, positions(k), strict=True):
         node.peer.vertices(name, part, stamp=k)
-    node.frames_status(answered=2 * (k + 1))
+    node.frames_status(processed=2 * (k + 1))
     return node.contacts(k)[-1] if k else None
 
 
@@ -42,10 +42,10 @@ def test_given_changed_and_replayed(start_node, tmp_path, hpccd):
     for name in MESHES:
         node.peer.topology(name, FACES, N * N)
     send(node, 0)
-    answer = send(node, 1)
-    assert assert_same_contacts(answer, frame(0), frame(1), scene()) > 0
-    kinds = np.frombuffer(answer.kind, np.uint8)
-    of_two = np.frombuffer(answer.mesh_a, np.uint32) != np.frombuffer(answer.mesh_b, np.uint32)
+    response = send(node, 1)
+    assert assert_same_contacts(response, frame(0), frame(1), scene()) > 0
+    kinds = np.frombuffer(response.kind, np.uint8)
+    of_two = np.frombuffer(response.mesh_a, np.uint32) != np.frombuffer(response.mesh_b, np.uint32)
     assert 0 < np.count_nonzero(of_two) and not np.any(kinds[of_two]), "vertices against faces only"
     assert set_parameter(node, "pairs.between.separation", 5e-3).successful  # which was not given at the start
     assert_same_contacts(send(node, 2), frame(1), frame(2), scene(5e-3))
@@ -75,7 +75,7 @@ def test_given_changed_and_replayed(start_node, tmp_path, hpccd):
     assert_same_contacts(send(node, 4), frame(3), frame(4), scene(2e-3))
     assert node.stop() == 0
     done = hpccd("replay", path)
-    assert done.returncode == 0 and "VERIFIED: 4 answers are equal" in done.stdout, done.stdout + done.stderr
+    assert done.returncode == 0 and "VERIFIED: 4 responses are equal" in done.stdout, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize(

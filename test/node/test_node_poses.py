@@ -84,8 +84,8 @@ def frame(k):
     return SceneFrame(k, k, "world", (SHEET, BLADE), vertices, NAMES, 0.0, (None, placement))
 
 
-def assert_answer(message, k, tolerance=TOLERANCE, most=64):
-    """The node's answer to the step that ends with frame k is that of the parts it is made of; how many contacts."""
+def assert_result(message, k, tolerance=TOLERANCE, most=64):
+    """The node's result to the step that ends with frame k is that of the parts it is made of; how many contacts."""
     meshes = (MeshSettings("cloth"), MeshSettings("blade", self_collision=False, input="pose"))
     options = Options(backend="cpu", rigid=RigidOptions(tolerance, most))
     expected = StepDetector(SceneBuilder(meshes), options).detect(frame(k - 1), frame(k))
@@ -125,30 +125,30 @@ def test_streamed_recorded_and_verified(start_node, tmp_path, by):
     )
     node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
     give_shape(node)
-    node.frames_status(answered=1)  # the shape
+    node.frames_status(processed=1)  # the shape
     kind, topic = (PoseStamped, client.pose_topic("blade")) if by == "pose" else (TransformStamped, "transforms")
     publisher = node.peer.publisher(kind, topic, qos.vertices("reliable", 100) if by == "pose" else qos.TRANSFORMS)
     total, parts = 0, set()
     for k in range(1, 9):
         publisher.publish(stamped(k) if by == "pose" else transform(k))
         node.peer.vertices("cloth", sheet_positions(N, k), stamp=k, frame_id="world")
-        node.frames_status(answered=1 + 2 * k)
+        node.frames_status(processed=1 + 2 * k)
         if k > 1:
-            answer = node.contacts(k - 1)[-1]
-            total += assert_answer(answer, k)
-            parts.add(answer.parts)
+            result = node.contacts(k - 1)[-1]
+            total += assert_result(result, k)
+            parts.add(result.parts)
     assert total > 100 and min(parts) > 1
     assert set_parameter(node, "rigid_tolerance", 0.05).successful
     publisher.publish(stamped(9) if by == "pose" else transform(9))
     node.peer.vertices("cloth", sheet_positions(N, 9), stamp=9, frame_id="world")
     coarse = node.contacts(8)[-1]
-    assert assert_answer(coarse, 9, 0.05) > 0 and coarse.parts < min(parts)
+    assert assert_result(coarse, 9, 0.05) > 0 and coarse.parts < min(parts)
     status = node.wait_until(lambda: node.peer.statuses["detection"][2].get("parts"), "parts in the status")
     assert int(status) >= 1
     assert set_parameter(node, "rigid_tolerance", 1e-9).successful
     publisher.publish(stamped(10) if by == "pose" else transform(10))
     node.peer.vertices("cloth", sheet_positions(N, 10), stamp=10, frame_id="world")
-    assert assert_answer(node.contacts(9)[-1], 10, 1e-9) > 0
+    assert assert_result(node.contacts(9)[-1], 10, 1e-9) > 0
     warned = "1 step with a motion beyond rigid_tolerance: blade was up to "
     node.wait_until(lambda: node.peer.statuses["detection"][1].startswith(warned), warned)
     assert node.peer.statuses["detection"][2]["coarse"] == "1"
@@ -163,7 +163,7 @@ def test_what_is_wrong_with_poses_is_rejected_and_said(start_node):
     publisher.publish(stamped(1))
     node.frames_status(dropped__no_shape=1)
     give_shape(node)
-    node.frames_status(answered=1)
+    node.frames_status(processed=1)
     wrong = stamped(2)
     wrong.pose.orientation.w = 3.0
     not_finite = stamped(3)
@@ -186,12 +186,12 @@ def test_each_file_of_a_split_recording_has_the_shape(start_node, tmp_path):
     give_shape(node)
     node.peer.topology("floor", np.array([[0, 1, 2]]), 3)
     node.peer.vertices("floor", np.array([[-9, -9, 0], [9, -9, 0], [0, 9, 0]], np.float32), stamp=0)
-    node.frames_status(answered=2)
+    node.frames_status(processed=2)
     publisher = node.peer.publisher(PoseStamped, client.pose_topic("blade"))
     for k in range(1, 9):
         for part in (0, 1):  # a split falls between two frames here and there: never between all of them
             publisher.publish(stamped(2 * k + part))
-        node.frames_status(answered=2 + 2 * k)
+        node.frames_status(processed=2 + 2 * k)
         time.sleep(0.1)
     assert node.stop() == 0
     files = sorted(folder.glob("*.mcap"))
@@ -213,14 +213,14 @@ def test_transforms_alone(start_node):
     for name in ("blade", "knife"):
         node.peer.topology(name, BLADE.faces, BLADE.n_vertices)
         node.peer.vertices(name, CORNERS.astype(np.float32), stamp=0)
-    node.frames_status(answered=2)
+    node.frames_status(processed=2)
     publisher = node.peer.publisher(TransformStamped, "transforms", qos.TRANSFORMS)
     for k in range(1, 4):
         for name, turned in (("blade", 1), ("knife", -1)):
             message = transform(k * turned)
             message.header.stamp, message.child_frame_id = fields.ns_to_stamp(k), f"{name}_link"
             publisher.publish(message)
-        node.frames_status(answered=2 + 2 * k, received__blade=1 + k)
+        node.frames_status(processed=2 + 2 * k, received__blade=1 + k)
     assert node.contacts(2)[-1].total > 0
 
 
@@ -250,13 +250,13 @@ def test_a_recording_that_missed_the_shape_says_what_to_do(start_node, tmp_path,
     path = tmp_path / "run.mcap"
     node = start_node({"meshes": ["blade"], "mesh.blade.input": "pose"})
     give_shape(node)
-    node.frames_status(answered=1)
+    node.frames_status(processed=1)
     assert set_parameter(node, "record", str(path)).successful
     node.peer.readers = 2
     publisher = node.peer.publisher(PoseStamped, client.pose_topic("blade"))
     for k in range(1, 4):
         publisher.publish(stamped(k))
-        node.frames_status(answered=1 + k)
+        node.frames_status(processed=1 + k)
     missing = "the shape of mesh blade is not in the recording (nothing came on meshes/blade/vertices), so no replay"
     node.wait_until(lambda: node.peer.statuses["recording"][1].startswith(missing), "the shape to be missed")
     assert node.stop() == 0

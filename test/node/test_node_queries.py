@@ -45,7 +45,7 @@ def node(tmp_path_factory):
 def ask(node, asked):
     client = node.peer.client()
     future = client.call_async(asked)
-    node.wait_until(future.done, "answer")
+    node.wait_until(future.done, "response")
     node.peer.node.destroy_client(client)
     return future.result()
 
@@ -60,21 +60,21 @@ def separated(*pairs):
 @pytest.mark.parametrize("query", ["", "contacts"])
 def test_contacts_with_the_separation_of_the_node(node, query):
     """Of its pairs only those whose meshes are asked for."""
-    answer = ask(node, request(query=query))
-    assert answer.success and answer.message.endswith("contacts"), answer.message
+    response = ask(node, request(query=query))
+    assert response.success and response.message.endswith("contacts"), response.message
     scene = separated(("cloth", "net", 0.004))
-    assert_same_contacts(answer.contacts, frame(0), frame(1), scene, minimum_separation=1e-3)
-    told = client.contacts_from_message(answer.contacts)
+    assert_same_contacts(response.contacts, frame(0), frame(1), scene, minimum_separation=1e-3)
+    told = client.contacts_from_message(response.contacts)
     assert (told.minimum_separation, told.pair_separation) == (1e-3, {("cloth", "net"): 0.004})
     assert told.closest.shape == (len(told), 2, 3)
-    assert len(answer.distances.distance) == 0
+    assert len(response.distances.distance) == 0
 
 
 @pytest.mark.parametrize("distance", [0.0, 0.002])
 def test_contacts_with_the_separation_of_the_request(node, distance):
-    answer = ask(node, request(minimum_separation=[distance]))
-    assert_same_contacts(answer.contacts, frame(0), frame(1), separated(), minimum_separation=distance)
-    told = client.contacts_from_message(answer.contacts)
+    response = ask(node, request(minimum_separation=[distance]))
+    assert_same_contacts(response.contacts, frame(0), frame(1), separated(), minimum_separation=distance)
+    told = client.contacts_from_message(response.contacts)
     assert (told.minimum_separation, told.pair_separation) == (distance, {})
 
 
@@ -94,38 +94,38 @@ def layout():
 
 @pytest.mark.parametrize("distance", [0.0, 0.004])
 def test_near_pairs(node, distance):
-    answer = ask(node, snapshot("proximity", distance=[distance]))
-    assert answer.success, answer.message
-    of_snapshot(answer.contacts)
+    response = ask(node, snapshot("proximity", distance=[distance]))
+    assert response.success, response.message
+    of_snapshot(response.contacts)
     expected = hc.Detector(separated(), outputs=("closest",)).proximity(frame(1), distance)
-    got = client.scene_contacts(answer.contacts, layout())
+    got = client.scene_contacts(response.contacts, layout())
     for name in ("vf", "vf_distance", "ee", "ee_distance", "closest"):
         assert np.array_equal(getattr(got, name), getattr(expected, name)), name
-    assert answer.contacts.hash == expected.hash and answer.contacts.total == len(expected)
-    assert answer.message == f"{len(expected)} pairs within {distance:g}"
+    assert response.contacts.hash == expected.hash and response.contacts.total == len(expected)
+    assert response.message == f"{len(expected)} pairs within {distance:g}"
     assert len(expected) > 10 or distance == 0
 
 
 def test_edges_in_faces(node):
-    answer = ask(node, snapshot("intersections"))
-    assert answer.success and answer.message.endswith("edges in faces"), answer.message
-    of_snapshot(answer.contacts)
+    response = ask(node, snapshot("intersections"))
+    assert response.success and response.message.endswith("edges in faces"), response.message
+    of_snapshot(response.contacts)
     expected = hc.Detector(separated()).intersections(frame(1))
-    got = client.scene_contacts(answer.contacts, layout())
+    got = client.scene_contacts(response.contacts, layout())
     assert np.array_equal(got.ef, expected.ef) and len(got.vf) == len(got.ee) == 0
-    assert answer.contacts.hash == expected.hash and len(expected) > 0
-    assert set(answer.contacts.kind) == {ContactArray.EDGE_FACE}
+    assert response.contacts.hash == expected.hash and len(expected) > 0
+    assert set(response.contacts.kind) == {ContactArray.EDGE_FACE}
 
 
 def test_smallest_distances(node):
-    answer = ask(node, snapshot("distances"))
-    assert (answer.success, answer.message) == (True, "3 pairs of meshes")
-    of_snapshot(answer.distances)
-    got = client.distances_from_message(answer.distances)
+    response = ask(node, snapshot("distances"))
+    assert (response.success, response.message) == (True, "3 pairs of meshes")
+    of_snapshot(response.distances)
+    got = client.distances_from_message(response.distances)
     expected = hc.Detector(separated()).distances(frame(1))
     assert [got.between(gap.mesh_a, gap.mesh_b) for gap in expected] == [gap.distance for gap in expected]
     assert np.array_equal(got.points, [gap.points for gap in expected])
-    assert len(answer.contacts.kind) == answer.contacts.total == 0
+    assert len(response.contacts.kind) == response.contacts.total == 0
 
 
 def test_meshes_that_intersect_and_meshes_far_apart(node):
@@ -171,9 +171,9 @@ def test_meshes_that_intersect_and_meshes_far_apart(node):
     ],
 )
 def test_bad_requests_are_rejected_with_a_reason(node, asked, text):
-    answer = ask(node, asked)
-    assert not answer.success and text in answer.message, answer.message
-    assert answer.contacts.total == len(answer.distances.distance) == 0
+    response = ask(node, asked)
+    assert not response.success and text in response.message, response.message
+    assert response.contacts.total == len(response.distances.distance) == 0
 
 
 @pytest.mark.parametrize(
@@ -185,22 +185,22 @@ def test_bad_requests_are_rejected_with_a_reason(node, asked, text):
         ("distances", "set a longer time_limit"),
     ],
 )
-def test_a_late_answer_says_what_this_query_can_do(node, query, help_):
+def test_a_late_response_says_what_this_query_can_do(node, query, help_):
     large = 150
     asked = Detect.Request(query=query, mesh_names=["sheet"], time_limit=1e-4)
     asked.distance = [0.1] if query == "proximity" else []
     asked.topologies = [mesh_messages.topology_message(sheet_faces(large), large**2)]
     asked.start = [mesh_messages.vertices_message(sheet_positions(large, 0), 5)] if query == "contacts" else []
     asked.end = [mesh_messages.vertices_message(sheet_positions(large, 1), 6)]
-    answer = ask(node, asked)
-    assert not answer.success and answer.message.endswith(f"before the answer was ready; {help_}"), answer.message
+    response = ask(node, asked)
+    assert not response.success and response.message.endswith(f"before the result was ready; {help_}"), response.message
 
 
 def test_only_the_nearest_of_many(start_node):
     node = start_node({"max_contacts": 7})
-    answer = ask(node, snapshot("proximity", distance=[0.01]))
+    response = ask(node, snapshot("proximity", distance=[0.01]))
     found = hc.Detector(separated()).proximity(frame(1), 0.01)
-    got = client.contacts_from_message(answer.contacts)
+    got = client.contacts_from_message(response.contacts)
     nearest = np.sort(np.concatenate([found.vf_distance, found.ee_distance]))[:7]
     assert np.sort(got.distance).tolist() == nearest.tolist()
-    assert (answer.contacts.total, answer.contacts.truncated) == (len(found), True)
+    assert (response.contacts.total, response.contacts.truncated) == (len(found), True)

@@ -118,7 +118,7 @@ def test_a_full_disk_stops_only_the_recording(start_node, tmp_path):
         lambda: (s := node.peer.statuses["recording"])[0] == b"\2" and (s[1], s[2]), "an error of the recording"
     )
     assert "File too large" in level and int(values["write_errors"]) >= 1
-    # The detection went on: `stream` waits for each answer. With space, the recording does too.
+    # The detection went on: `stream` waits for each result. With space, the recording does too.
     resource.prlimit(node.process.pid, resource.RLIMIT_FSIZE, limit)
     before = int(values["messages"])
     for k in range(25, 2000):

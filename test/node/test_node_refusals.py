@@ -61,7 +61,7 @@ BAD_VERTICES = {
 
 @pytest.fixture
 def streaming(start_node):
-    """A node that has answered one step, and a check that it goes on as if nothing had been."""
+    """A node that has processed one step, and a check that it goes on as if nothing had been."""
     node = start_node({"meshes": ["cloth"], "max_vertices": 100, "restart_after": 0})
     node.peer.topology("cloth", FACES, N * N, version=3)
 
@@ -92,9 +92,9 @@ def test_bad_vertices(streaming, kind):
     node.peer.publisher(MeshVertices, "meshes/cloth/vertices").publish(message)
     values = node.frames_status(dropped=1, **{f"dropped__cloth__{reason}": 1})
     assert text in values["last_rejection"]
-    answer = goes_on()
-    assert answer.dropped_frames == 1
-    node.frames_status(received=4, answered=3, dropped=1, waiting=0)
+    result = goes_on()
+    assert result.dropped_frames == 1
+    node.frames_status(received=4, processed=3, dropped=1, waiting=0)
     node.wait_until(lambda: text in node.output(), "line in the log")
 
 
@@ -112,9 +112,9 @@ def test_what_cannot_be_deserialised_is_told_as_such(streaming):
     for _ in range(5):  # how many these are is known at the next that is read
         publisher.publish(UNREADABLE)
     node.wait_until(lambda: int(node.peer.statuses["frames"][2]["dropped"]) >= 3, "count of the unreadable ones")
-    answer = goes_on()
-    assert answer.dropped_frames == 7
-    values = node.frames_status(received=10, answered=3, dropped=7, dropped__cloth__malformed=7, waiting=0)
+    result = goes_on()
+    assert result.dropped_frames == 7
+    values = node.frames_status(received=10, processed=3, dropped=7, dropped__cloth__malformed=7, waiting=0)
     assert "dropped.middleware" not in values
 
 
@@ -159,7 +159,7 @@ def test_a_triangle_that_names_a_vertex_twice_is_a_segment(start_node):
     end = start - np.array([[0, 0, 0], [0, 0, 0], [0, 0, 2], [0, 0, 0], [0, 0, 0]], np.float32)
     for k, positions in enumerate((start, end)):
         node.peer.vertices("cloth", positions, k)
-        node.frames_status(answered=k + 1)
+        node.frames_status(processed=k + 1)
     message = node.contacts(1)[0]
     assert assert_same_contacts(message, start, end, scene_of(cloth=faces)) > 0, "vertex 2 goes through it"
     assert node.peer.statuses["frames"][2].get("topologies_rejected", "0") == "0"
@@ -174,7 +174,7 @@ def test_a_conflict_right_behind_the_topology_does_not_replace_it(start_node):
     node.frames_status(topologies_rejected=1, topologies_rejected__cloth__topology_conflict=1)
     for k in range(2):
         node.peer.vertices("cloth", sheet_positions(N, k), k, topology_version=3)
-        node.frames_status(answered=k + 1)
+        node.frames_status(processed=k + 1)
     expected = sheet_positions(N, 0), sheet_positions(N, 1)
     assert assert_same_contacts(node.contacts(1)[0], *expected, scene_of(cloth=FACES)) > 0
 
@@ -233,7 +233,7 @@ def test_meshes_of_another_node_are_not_counted(streaming, start_node):
     node.wait_until(other_listens, "the subscription of the other node")
     for k in range(3):
         node.peer.vertices("ball", sheet_positions(N, k), k)
-        other.frames_status(received=k + 1, answered=k + 1)
+        other.frames_status(received=k + 1, processed=k + 1)
     node.peer.publisher(MeshVertices, "meshes/clot/vertices").publish(mesh_messages.vertices_message(GOOD, 1))
     values = node.frames_status(dropped=1, dropped__clot__unknown_mesh=1)
     assert "received.ball" not in values
@@ -273,14 +273,14 @@ def test_restarted_publisher_is_heard_at_once(start_node):
         node.contacts(2 + k)
     message = node.contacts(4)[2]
     assert fields.stamp_to_ns(message.start) == 10
-    node.frames_status(restarts=1, received=6, answered=6, dropped=0)
+    node.frames_status(restarts=1, received=6, processed=6, dropped=0)
 
 
 def test_restarted_simulation_brings_its_own_frame(start_node):
     node = start_node({"meshes": ["cloth"]})
     node.peer.topology("cloth", FACES, N * N)
     node.peer.vertices("cloth", GOOD, 1, frame_id="stray")
-    node.frames_status(answered=1, frame_id="stray", frame_id_by="a message of mesh cloth")
+    node.frames_status(processed=1, frame_id="stray", frame_id_by="a message of mesh cloth")
     node.peer.forget_publisher("meshes/cloth/vertices")
     for k in range(3):
         node.peer.vertices("cloth", sheet_positions(N, k), 10 + k, frame_id="world")
@@ -288,7 +288,7 @@ def test_restarted_simulation_brings_its_own_frame(start_node):
     for message, k in zip(node.contacts(2), (1, 2), strict=True):
         assert (message.header.frame_id, fields.stamp_to_ns(message.start)) == ("world", 9 + k)
         assert_same_contacts(message, sheet_positions(N, k - 1), sheet_positions(N, k), scene_of(cloth=FACES))
-    node.frames_status(answered=4, dropped=0, restarts=1, frame_id="world")
+    node.frames_status(processed=4, dropped=0, restarts=1, frame_id="world")
 
 
 def test_no_time_is_hidden_by_a_frame_that_cannot_be_tested(start_node):
@@ -299,7 +299,7 @@ def test_no_time_is_hidden_by_a_frame_that_cannot_be_tested(start_node):
         scale = 1e200 if k in (0, 2) else 1.0
         node.peer.vertices("cloth", scale * sheet_positions(N, k, dtype=np.float64), k)
         node.frames_status(received=k + 1, waiting=0)
-    values = node.frames_status(answered=2, dropped=2, dropped__cloth__out_of_range=2)
+    values = node.frames_status(processed=2, dropped=2, dropped__cloth__out_of_range=2)
     assert "1e+150" in values["last_rejection"]
     (message,) = node.contacts(1)
     assert (fields.stamp_to_ns(message.start), fields.stamp_to_ns(message.header.stamp)) == (1, 3)

@@ -53,7 +53,7 @@ def frame(k, by_joints=True):
     return SceneFrame(k, k, "world", TOPOLOGIES, vertices, NAMES, 0.0, (None, *placements))
 
 
-def assert_answer(message, k, by_joints=True):
+def assert_result(message, k, by_joints=True):
     """That of the step from frame k - 1 to k; how many contacts."""
     options = Options(backend="cpu", rigid=RigidOptions(TOLERANCE, 64))
     expected = StepDetector(BUILDER, options).detect(frame(k - 1, by_joints), frame(k, by_joints))
@@ -94,7 +94,7 @@ def first_step(node):
     for k in (1, 2):
         joints.publish(crane.joint_state(k, k))
         cloth(node, k)
-        node.frames_status(answered=4 * k)
+        node.frames_status(processed=4 * k)
     return joints
 
 
@@ -135,9 +135,9 @@ def test_streamed_recorded_and_verified(start_node, tmp_path, by, given):
         for message in [crane.joint_state(k, k)] if by == "joints" else transforms(k, "left_"):
             publisher.publish(message)
         cloth(node, k)
-        node.frames_status(answered=4 * k)
+        node.frames_status(processed=4 * k)
         if k > 1:
-            total += assert_answer(node.contacts(k - 1)[-1], k, by == "joints")
+            total += assert_result(node.contacts(k - 1)[-1], k, by == "joints")
     assert total > 30
     assert node.stop() == 0
     file.unlink()  # a replay needs it no more
@@ -156,7 +156,7 @@ def test_played_over_dds_with_its_description(start_node, tmp_path):
     for k in range(1, steps + 1):
         joints.publish(crane.joint_state(k, k))
         cloth(node, k)
-        node.frames_status(answered=4 * k)
+        node.frames_status(processed=4 * k)
     assert node.stop() == 0
     names = ("robot_description", "joint_states", "meshes/cloth/topology", "meshes/cloth/vertices")
     again = start_node(
@@ -174,7 +174,7 @@ def test_a_robot_alone_moves_at_the_times_of_its_joint_states(start_node):
     publisher = node.peer.publisher(JointState, "joint_states")
     for k in range(1, 4):
         publisher.publish(crane.joint_state(k, k))
-        node.frames_status(answered=3 * k, received=3 * k)
+        node.frames_status(processed=3 * k, received=3 * k)
     assert [message.header.stamp.nanosec for message in node.contacts(2)] == [2, 3]
     far = crane.joint_state(4, 4)
     far.position[0] = 1e10
@@ -194,8 +194,8 @@ def test_a_base_that_moves_by_transforms(start_node):
         cloth(node, k)
         node.wait_until(lambda awaited=awaited: awaited in node.peer.statuses["frames"][1], "a word of it")
         tree.publish(next(transforms(k, "left_")))  # of the root
-        node.frames_status(answered=4 * k)
-    assert_answer(node.contacts(1)[-1], 2)
+        node.frames_status(processed=4 * k)
+    assert_result(node.contacts(1)[-1], 2)
 
 
 def test_frames_wait_for_joint_states_and_take_what_lies_between_two(start_node):
@@ -214,7 +214,7 @@ def test_frames_wait_for_joint_states_and_take_what_lies_between_two(start_node)
     joints.publish(half)
     joints.publish(crane.joint_state(0, 5))
     joints.publish(crane.joint_state(2, 15))
-    values = node.frames_status(answered=4, waiting=0)
+    values = node.frames_status(processed=4, waiting=0)
     cloth(node, 12)
     assert node.contacts(1)[0].start.nanosec == 10
     wrong = crane.joint_state(1, 20)
@@ -240,15 +240,15 @@ def test_the_clock_is_set_back(start_node):
     for k in (50, 51):
         joints.publish(crane.joint_state(k, k * second))
         node.peer.vertices("cloth", sheet_positions(N, k), stamp=k * second, frame_id="world")
-        node.frames_status(answered=4 * (k - 49))
+        node.frames_status(processed=4 * (k - 49))
     for k in (1, 2, 3):
         joints.publish(crane.joint_state(k, k * second))
         node.peer.vertices("cloth", sheet_positions(N, k), stamp=k * second, frame_id="world")
     node.frames_status(restarts=1)
-    answer = node.contacts(2)[-1]
-    assert (answer.start.sec, answer.header.stamp.sec) == (2, 3)
+    result = node.contacts(2)[-1]
+    assert (result.start.sec, result.header.stamp.sec) == (2, 3)
     options = Options(backend="cpu", rigid=RigidOptions(TOLERANCE, 64))
-    assert answer.hash == StepDetector(BUILDER, options).detect(frame(2), frame(3)).contacts.hash
+    assert result.hash == StepDetector(BUILDER, options).detect(frame(2), frame(3)).contacts.hash
 
 
 def test_another_description_makes_another_scene(start_node):
@@ -262,7 +262,7 @@ def test_another_description_makes_another_scene(start_node):
     publisher.publish(String(data=crane.URDF))
     node.wait_until(lambda: "robot crane" not in node.peer.statuses["frames"][1], "the second description")
     joints = first_step(node)
-    assert_answer(node.contacts(1)[-1], 2)
+    assert_result(node.contacts(1)[-1], 2)
     longer = crane.URDF.replace('"0.6 0.06 0.04"', '"0.9 0.06 0.04"')
     publisher.publish(String(data="<robot"))
     node.wait_until(
@@ -274,7 +274,7 @@ def test_another_description_makes_another_scene(start_node):
     for k in (3, 4):
         joints.publish(crane.joint_state(k, k))
         cloth(node, k)
-    answer = node.contacts(2)[-1]
+    result = node.contacts(2)[-1]
     placements = [robot.placements(robot.kinematics.state(crane.values(k), BASE)) for k in (3, 4)]
     frames = [
         SceneFrame(
@@ -290,7 +290,7 @@ def test_another_description_makes_another_scene(start_node):
         for k, at in zip((3, 4), placements, strict=True)
     ]
     options = Options(backend="cpu", rigid=RigidOptions(TOLERANCE, 64))
-    assert answer.hash == StepDetector(BUILDER, options).detect(*frames).contacts.hash
+    assert result.hash == StepDetector(BUILDER, options).detect(*frames).contacts.hash
 
 
 def test_a_file_that_cannot_be_used_ends_the_start(start_node, tmp_path):
@@ -354,27 +354,27 @@ def test_pairs_name_robots_and_links(start_node):
     )
     describe(node)
     first_step(node)
-    answer = node.contacts(1)[-1]  # the description is in use
+    result = node.contacts(1)[-1]  # the description is in use
     rejected = set_parameter(node, "pair_separation", ["crane/hoek:cloth:0.02"])
     assert not rejected.successful and "'crane' has no link of this name" in rejected.reason, rejected.reason
     assert not set_parameter(node, "pair_separation", ["crane/:cloth:0.02"]).successful
-    names = list(answer.mesh_names)
+    names = list(result.mesh_names)
     told = {
         (names[a], names[b]): distance
-        for a, b, distance in zip(answer.separation_mesh_a, answer.separation_mesh_b, answer.separations, strict=True)
+        for a, b, distance in zip(result.separation_mesh_a, result.separation_mesh_b, result.separations, strict=True)
     }
     assert {frozenset(pair): value for pair, value in told.items()} == {
         frozenset(("cloth", "crane/mast")): 0.01,
         frozenset(("cloth", "crane/boom")): 0.01,
         frozenset(("cloth", "crane/hook")): 0.02,
     }
-    assert not {(names[a], names[b]) for a, b in zip(answer.mesh_a, answer.mesh_b, strict=True)} & {
+    assert not {(names[a], names[b]) for a, b in zip(result.mesh_a, result.mesh_b, strict=True)} & {
         ("crane/mast", "crane/hook"),
         ("crane/hook", "crane/mast"),
     }
 
 
-def test_frames_that_came_before_the_description_are_answered(start_node):
+def test_frames_that_came_before_the_description_are_processed(start_node):
     node = start_node({**parameters(**JOINTS), "frame_queue": 5})
     node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
     joints = node.peer.publisher(JointState, "joint_states")
@@ -383,9 +383,9 @@ def test_frames_that_came_before_the_description_are_answered(start_node):
         cloth(node, k)
     node.frames_status(waiting=3, dropped=0)
     describe(node)
-    for k, answer in enumerate(node.contacts(2), 2):
-        assert_answer(answer, k)
-    node.frames_status(answered=12, waiting=0, dropped=0)
+    for k, result in enumerate(node.contacts(2), 2):
+        assert_result(result, k)
+    node.frames_status(processed=12, waiting=0, dropped=0)
 
 
 def test_a_pair_that_names_no_link_is_mended_by_its_parameter(start_node):
@@ -452,7 +452,7 @@ def test_joint_states_that_cannot_be_used_are_told_of_before_the_robot_is_known(
     publisher.publish(String(data=crane.URDF.replace('"0.6 0.06 0.04"', '"0.9 0.06 0.04"')))
     node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
     cloth(node, 1)
-    assert node.frames_status(answered=4)["joint_states_rejected"] == "3"
+    assert node.frames_status(processed=4)["joint_states_rejected"] == "3"
 
 
 def test_a_joint_state_stamped_far_ahead_is_left_out_and_told_of(start_node, tmp_path):
@@ -466,7 +466,7 @@ def test_a_joint_state_stamped_far_ahead_is_left_out_and_told_of(start_node, tmp
     joints.publish(crane.joint_state(4, 4))
     joints.publish(crane.joint_state(5, 5))
     cloth(node, 5)
-    values = node.frames_status(answered=16, dropped=0, joint_states_rejected=1)
+    values = node.frames_status(processed=16, dropped=0, joint_states_rejected=1)
     assert "one of stamp 3600000000000 ns came more than 10 s ahead" in values["last_rejection"]
     assert values["last_rejection"].startswith("joint_states: stamp_ahead: ") and values["restarts"] == "0"
     assert node.stop() == 0
@@ -484,7 +484,7 @@ def test_a_robot_alone_is_recorded(start_node, tmp_path):
     publisher = node.peer.publisher(JointState, "joint_states", qos.TRANSFORMS)
     for k in range(1, 5):
         publisher.publish(crane.joint_state(k, k))
-        node.frames_status(answered=3 * k)
+        node.frames_status(processed=3 * k)
     assert node.stop() == 0
     with Recording(path) as recording:
         replay = Replay(recording, recorded_setup.of_recording(recording))
@@ -504,7 +504,7 @@ def test_a_robot_alone_goes_on_after_its_clock_was_set_back_by_less_than_a_secon
             publisher.publish(crane.joint_state(k + 10 * run, (100 * k + 7 * run) * ms))
     stamps = [message.header.stamp.nanosec // ms for message in node.contacts(10)]
     assert stamps == [*range(200, 900, 100), 607, 707, 807]
-    node.frames_status(answered=3 * 12, restarts=1, dropped=0, waiting=0)
+    node.frames_status(processed=3 * 12, restarts=1, dropped=0, waiting=0)
     assert node.stop() == 0
     with Recording(path) as recording:
         replay = Replay(recording, recorded_setup.of_recording(recording))
@@ -533,7 +533,7 @@ def test_mesh_files_of_a_rejected_description_do_not_take_the_place_of_those_in_
     for k in (1, 2, 3):
         joints.publish(crane.joint_state(k, k))
         cloth(node, k)
-        node.frames_status(answered=4 * k)
+        node.frames_status(processed=4 * k)
     assert node.stop() == 0
     with Recording(path) as recording:
         replay = Replay(recording, recorded_setup.of_recording(recording))
@@ -579,7 +579,7 @@ def test_a_wrong_frame_prefix_is_one_line_in_the_log(start_node):
     assert line.endswith("; as well crane/boom, crane/hook")
 
 
-def test_a_summary_that_is_told_after_the_scene_changed_has_the_links_of_its_answer(start_node):
+def test_a_summary_that_is_told_after_the_scene_changed_has_the_links_of_its_result(start_node):
     node = start_node({**parameters(**JOINTS), "pair_summaries": True}, program=[str(SUPPORT / "holding_node.py")])
     publisher, heard = describe(node), []
     node.peer.node.create_subscription(PairSummaryArray, client.PAIRS_TOPIC, heard.append, client.PAIRS_QOS)
@@ -616,5 +616,5 @@ def test_a_robot_alone_says_what_it_waits_for(start_node, by):
     for k in (1, 2):
         for message in [crane.joint_state(k, k)] if by == "joints" else transforms(k, "left_"):
             (joints if by == "joints" else tree).publish(message)
-        node.frames_status(answered=3 * k)
+        node.frames_status(processed=3 * k)
     node.wait_until(lambda: "no frame yet" not in node.peer.statuses["frames"][1], "no more of it")

@@ -46,11 +46,11 @@ def test_streamed_recorded_verified_and_drawn(start_node, tmp_path, hpccd):
     for k in range(8):
         node.peer.vertices("rope", rope(k), stamp=k, frame_id="world")
         node.peer.vertices("cloth", sheet_positions(N, k), stamp=k, frame_id="world")
-        node.frames_status(answered=2 * (k + 1))
+        node.frames_status(processed=2 * (k + 1))
         if k:
-            answer = node.contacts(k)[-1]
-            assert assert_same_contacts(answer, frame(k - 1), frame(k), scene()) > 0
-            kinds += np.bincount(answer.kind, minlength=2)
+            response = node.contacts(k)[-1]
+            assert assert_same_contacts(response, frame(k - 1), frame(k), scene()) > 0
+            kinds += np.bincount(response.kind, minlength=2)
     assert (kinds > 0).all()
     assert node.stop() == 0
     with Recording(path) as recording:
@@ -81,8 +81,8 @@ def test_asked_of_detect(start_node):
     ]
     request.end = [mesh_messages.vertices_message(part, 0) for part in (rope(2), sheet_positions(N, 2))]
     future = node.peer.client().call_async(request)
-    node.wait_until(future.done, "answer")
-    answer = future.result()
+    node.wait_until(future.done, "response")
+    response = future.result()
     expected = hc.Detector(scene()).intersections(frame(2)).ef
-    assert answer.success and answer.contacts.total == len(expected) > 0
-    assert 0 in answer.contacts.mesh_a, "edges of the rope pierce the cloth"
+    assert response.success and response.contacts.total == len(expected) > 0
+    assert 0 in response.contacts.mesh_a, "edges of the rope pierce the cloth"

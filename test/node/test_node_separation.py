@@ -23,7 +23,7 @@ from hpccd_ros.replay.recomputed import Replay
 
 
 class Stream:
-    """Frames of both meshes, each answered before the next is sent."""
+    """Frames of both meshes, each processed before the next is sent."""
 
     def __init__(self, node):
         self.node, self.sent = node, 0
@@ -32,25 +32,25 @@ class Stream:
         self.send()
 
     def send(self):
-        """The answer to the step, or None to the first frame."""
+        """The response to the step, or None to the first frame."""
         for name, part in zip(MESHES, positions(self.sent), strict=True):
             self.node.peer.vertices(name, part, stamp=self.sent, frame_id="world")
         self.sent += 1
-        self.node.frames_status(answered=2 * self.sent)
+        self.node.frames_status(processed=2 * self.sent)
         return self.node.contacts(self.sent - 1)[-1] if self.sent > 1 else None
 
     def expect(self, minimum=0.0, **pairs):
-        """Send a frame; its answer is that of the core with these separations, and tells them."""
+        """Send a frame; its result is that of the core with these separations, and reports them."""
         scene = scene_of(cloth=FACES, net=FACES)
         for pair, distance in pairs.items():
             scene.set_separation(*pair.split("_"), distance)
-        answer = self.send()
+        response = self.send()
         frames = frame(self.sent - 2), frame(self.sent - 1)
-        assert_same_contacts(answer, *frames, scene, minimum_separation=minimum)
-        told = client.contacts_from_message(answer)
+        assert_same_contacts(response, *frames, scene, minimum_separation=minimum)
+        told = client.contacts_from_message(response)
         assert told.minimum_separation == minimum
         assert told.pair_separation == {tuple(pair.split("_")): distance for pair, distance in pairs.items()}
-        return answer
+        return response
 
     def set(self, name, value):
         return set_parameter(self.node, name, value)
@@ -98,8 +98,8 @@ def test_given_at_the_start_and_changed_from_step_to_step(start_node):
     ],
 )
 def test_bad_values_are_rejected_with_a_reason(shared_stream, name, value, reason):
-    answer = shared_stream.set(name, value)
-    assert not answer.successful and reason in answer.reason, answer.reason
+    response = shared_stream.set(name, value)
+    assert not response.successful and reason in response.reason, response.reason
     shared_stream.expect(1e-3)
 
 
@@ -155,7 +155,7 @@ def test_direction_and_speed_of_approach(start_node):
     def send(k, height):
         node.peer.vertices("hand", hand_and_table.hand(height), stamp=k * half)
         node.peer.vertices("table", hand_and_table.TABLE, stamp=k * half)
-        node.frames_status(answered=2 * (k + 1))
+        node.frames_status(processed=2 * (k + 1))
 
     for k, height in enumerate((1.0, 0.75, 0.5, 0.625, 0.0)):
         send(k, height)
@@ -179,8 +179,8 @@ def test_the_sides_of_near_pairs_are_marked(start_node):
     stream = Stream(node)
     stream.send()
     assert stream.set("minimum_separation", 5e-3).successful
-    answer = stream.send()
-    assert len(answer.closest) == 0, "the contacts carry nearest points only where asked for (outputs)"
+    response = stream.send()
+    assert len(response.closest) == 0, "the contacts carry nearest points only where asked for (outputs)"
     near = [markers.markers[3] for markers in node.wait_until(lambda: len(heard) == 2 and heard, "two marker arrays")]
     assert [(len(marker.points), marker.ns) for marker in near] == [(0, "near"), (20, "near")]
     ends = np.array([[point.x, point.y, point.z] for point in near[1].points]).reshape(-1, 2, 3)
@@ -209,6 +209,6 @@ def test_recorded_with_all_its_changes_and_verified(start_node, tmp_path, hpccd)
     found = replay.distances
     assert (found.verified, found.diverged, found.unverified, found.first) == (3, 0, 0, "")
     done = hpccd("replay", path)
-    assert done.returncode == 0 and "  3 answers about distances are equal" in done.stdout, done.stdout
-    equal = "VERIFIED: 4 answers are equal in every contact, time and hash"
+    assert done.returncode == 0 and "  3 responses about distances are equal" in done.stdout, done.stdout
+    equal = "VERIFIED: 4 responses are equal in every contact, time and hash"
     assert f"{equal} (accuracy exact; separation 0.001; separation {told})" in done.stdout, done.stdout

@@ -30,13 +30,13 @@ from hpccd_ros.node.detect_service import DetectService
 
 
 def ask(node, *requests):
-    """Answers to requests that are all under way at the same time, each from a client of its own."""
+    """Responses to requests that are all under way at the same time, each from a client of its own."""
     clients = [node.peer.client() for _ in requests]
     return gather(node, [client.call_async(r) for client, r in zip(clients, requests, strict=True)])
 
 
 def gather(node, futures):
-    node.wait_until(lambda: all(f.done() for f in futures), f"{len(futures)} answers")
+    node.wait_until(lambda: all(f.done() for f in futures), f"{len(futures)} responses")
     return [f.result() for f in futures]
 
 
@@ -57,55 +57,55 @@ def node(start_node):
 
 
 def test_without_any_stream(node):
-    (answer,) = ask(node, request(dtype=np.float64))
-    assert answer.success and answer.message.endswith("contacts"), answer.message
+    (response,) = ask(node, request(dtype=np.float64))
+    assert response.success and response.message.endswith("contacts"), response.message
     start, end = (sheet_positions(N, k, dtype=np.float64) for k in (0, 1))
-    assert assert_same_contacts(answer.contacts, start, end, scene_of(cloth=FACES)) > 100
-    header = answer.contacts.header
-    assert (header.frame_id, fields.stamp_to_ns(header.stamp), answer.contacts.step) == ("lab", 1, 1)
-    assert fields.stamp_to_ns(answer.contacts.start) == 0
+    assert assert_same_contacts(response.contacts, start, end, scene_of(cloth=FACES)) > 100
+    header = response.contacts.header
+    assert (header.frame_id, fields.stamp_to_ns(header.stamp), response.contacts.step) == ("lab", 1, 1)
+    assert fields.stamp_to_ns(response.contacts.start) == 0
 
 
 def test_meshes_that_the_node_does_not_have(node):
-    (answer,) = ask(node, request(names=("left", "right")))
-    assert answer.success, answer.message
+    (response,) = ask(node, request(names=("left", "right")))
+    assert response.success, response.message
     frames = [np.concatenate([sheet_positions(N, k), sheet_positions(N, k + 2, offset=0.003)]) for k in (0, 1)]
-    assert assert_same_contacts(answer.contacts, *frames, scene_of(left=FACES, right=FACES)) > 100
-    assert list(answer.contacts.mesh_names) == ["left", "right"]
+    assert assert_same_contacts(response.contacts, *frames, scene_of(left=FACES, right=FACES)) > 100
+    assert list(response.contacts.mesh_names) == ["left", "right"]
 
 
 def test_topology_versions_are_those_of_the_request(node):
     given = request(names=("left", "right"))
     for i, version in enumerate((7, 2**32 - 1)):
         given.topologies[i].version = given.start[i].topology_version = given.end[i].topology_version = version
-    (answer,) = ask(node, given)
-    assert list(answer.contacts.topology_versions) == [7, 2**32 - 1]
+    (response,) = ask(node, given)
+    assert list(response.contacts.topology_versions) == [7, 2**32 - 1]
 
 
 def test_topology_of_the_stream_is_used(node):
-    (answer,) = ask(node, request(topologies=False))
-    assert not answer.success and "no topology yet" in answer.message
+    (response,) = ask(node, request(topologies=False))
+    assert not response.success and "no topology yet" in response.message
     node.peer.topology("cloth", FACES, N * N)
-    (answer,) = ask(node, request(topologies=False))
-    if not answer.success:  # the topology came after the request
+    (response,) = ask(node, request(topologies=False))
+    if not response.success:  # the topology came after the request
         node.wait_until(lambda: ask(node, request(topologies=False))[0].success, "topology")
-        (answer,) = ask(node, request(topologies=False))
-    assert_same_contacts(answer.contacts, sheet_positions(N, 0), sheet_positions(N, 1), scene_of(cloth=FACES))
+        (response,) = ask(node, request(topologies=False))
+    assert_same_contacts(response.contacts, sheet_positions(N, 0), sheet_positions(N, 1), scene_of(cloth=FACES))
 
 
 def test_several_clients_at_once(node):
-    answers = ask(node, *(request(step) for step in range(6)))
-    for step, answer in enumerate(answers):
-        assert answer.success, answer.message
+    responses = ask(node, *(request(step) for step in range(6)))
+    for step, response in enumerate(responses):
+        assert response.success, response.message
         frames = sheet_positions(N, step), sheet_positions(N, step + 1)
-        assert_same_contacts(answer.contacts, *frames, scene_of(cloth=FACES))
-    node.wait_until(lambda: node.peer.statuses["service"][2]["answered"] == "6", "count of answers")
+        assert_same_contacts(response.contacts, *frames, scene_of(cloth=FACES))
+    node.wait_until(lambda: node.peer.statuses["service"][2]["succeeded"] == "6", "count of responses")
 
 
 def test_options_of_the_request(node):
-    (answer,) = ask(node, request(accuracy="balanced", report="first"))
+    (response,) = ask(node, request(accuracy="balanced", report="first"))
     frames = sheet_positions(N, 0), sheet_positions(N, 1)
-    assert_same_contacts(answer.contacts, *frames, scene_of(cloth=FACES), report="first")
+    assert_same_contacts(response.contacts, *frames, scene_of(cloth=FACES), report="first")
 
 
 @pytest.mark.parametrize("bad, text", BAD, ids=BAD_IDS)
@@ -114,16 +114,16 @@ def test_bad_requests_are_rejected_with_a_reason(node, bad, text):
     assert not rejected.success and text in rejected.message, rejected.message
     assert len(rejected.contacts.toc) == 0 and len(rejected.message) < 1200
     assert good.success, "the node goes on"
-    service_counts(node, answered=1, rejected=1, failed=0)
+    service_counts(node, succeeded=1, rejected=1, failed=0)
 
 
 def test_busy_node_rejects_at_once(start_node):
     node = start_node({"meshes": ["cloth"], "detect_jobs": 1, "detect_waiting": 0})
-    answers = ask(node, *(request(2, n=LARGE) for _ in range(4)))
-    messages = [a.message for a in answers]
-    assert sum(a.success for a in answers) >= 1, messages
+    responses = ask(node, *(request(2, n=LARGE) for _ in range(4)))
+    messages = [a.message for a in responses]
+    assert sum(a.success for a in responses) >= 1, messages
     assert sum(m.startswith("busy: 1 requests") for m in messages) >= 1, messages
-    assert all(a.success or a.message.startswith("busy") for a in answers)
+    assert all(a.success or a.message.startswith("busy") for a in responses)
     (later,) = ask(node, request())
     assert later.success, "a place is free again"
 
@@ -149,16 +149,16 @@ def test_time_limit_of_any_size(node, limit):
 
 
 @pytest.mark.parametrize("many", [60, 300])
-def test_every_request_of_a_burst_is_answered(start_node, many):
+def test_every_request_of_a_burst_gets_a_response(start_node, many):
     """However many come at once: those that find no place are told so, and counted."""
     node = start_node({"meshes": ["cloth"], "detect_jobs": 1, "detect_waiting": 2})
     client = node.peer.client(depth=many)
     small = request(n=3)
-    answers = gather(node, [client.call_async(small) for _ in range(many)])
-    good = sum(answer.success for answer in answers)
-    busy = sum(answer.message.startswith("busy: 3 requests") for answer in answers)
+    responses = gather(node, [client.call_async(small) for _ in range(many)])
+    good = sum(response.success for response in responses)
+    busy = sum(response.message.startswith("busy: 3 requests") for response in responses)
     assert good >= 3 and good + busy == many
-    service_counts(node, open=0, answered=good, busy=busy)
+    service_counts(node, open=0, succeeded=good, busy=busy)
 
 
 @pytest.mark.parametrize(
@@ -169,20 +169,20 @@ def test_every_request_of_a_burst_is_answered(start_node, many):
     ],
     ids=["clean-up", "shutdown"],
 )
-def test_open_requests_are_answered_before_the_service_ends(start_node, transitions):
+def test_open_requests_get_a_response_before_the_service_ends(start_node, transitions):
     """One that is computed, one that waits for its turn."""
     node = start_node({"meshes": ["cloth"], "detect_jobs": 1, "threads": 1})
     long = long_request(("a", "b", "c"))  # still open when a busy machine has told of it
     replies = [node.peer.client().call_async(long) for _ in range(2)]
     service_counts(node, open=2)
     assert all(change_state(node, transition) for transition in transitions)
-    for answer in gather(node, replies):
-        assert not answer.success and answer.message.startswith("stopped: "), answer.message
+    for response in gather(node, replies):
+        assert not response.success and response.message.startswith("stopped: "), response.message
     if Transition.TRANSITION_CLEANUP in transitions:
         assert change_state(node, Transition.TRANSITION_CONFIGURE)
         assert change_state(node, Transition.TRANSITION_ACTIVATE)
-        (answer,) = ask(node, request())
-        assert answer.success, answer.message
+        (response,) = ask(node, request())
+        assert response.success, response.message
     assert node.stop() == 0 and "Traceback" not in node.output()
 
 
@@ -196,7 +196,7 @@ def test_stream_goes_on_while_requests_are_computed(node):
         node.contacts(k)
         under_way.append(k > 0 and not all(f.done() for f in futures))
     assert any(under_way), "the steps of the stream waited for the requests"
-    node.wait_until(lambda: all(f.done() for f in futures), "answers")
+    node.wait_until(lambda: all(f.done() for f in futures), "responses")
     assert all(f.result().success for f in futures)
     for k, message in enumerate(node.contacts(4), start=1):
         assert_same_contacts(message, sheet_positions(N, k - 1), sheet_positions(N, k), scene_of(cloth=FACES))
@@ -204,10 +204,10 @@ def test_stream_goes_on_while_requests_are_computed(node):
 
 def test_outputs_of_the_node_are_sent(start_node):
     node = start_node({"meshes": ["cloth"], "outputs": ["points"], "max_contacts": 50})
-    (answer,) = ask(node, request())
+    (response,) = ask(node, request())
     full = hc.Detector(scene_of(cloth=FACES)).detect(sheet_positions(N, 0), sheet_positions(N, 1))
-    assert answer.contacts.truncated and answer.contacts.total == len(full)
-    assert len(answer.contacts.points) == 150 and len(answer.contacts.normals) == 0
+    assert response.contacts.truncated and response.contacts.total == len(full)
+    assert len(response.contacts.points) == 150 and len(response.contacts.normals) == 0
 
 
 @pytest.fixture
@@ -237,12 +237,12 @@ def service():
     assert client.wait_for_service(PATIENCE)
 
     def ask_once(what):
-        answer = client.call_async(what)
+        response = client.call_async(what)
         deadline = time.monotonic() + PATIENCE
         # Not spin_until_future_complete, which leaves a task of its own for each turn.
-        while not answer.done() and time.monotonic() < deadline:
+        while not response.done() and time.monotonic() < deadline:
             executor.spin_once(timeout_sec=0.1)
-        return answer.result()
+        return response.result()
 
     yield ask_once
     assert errors.count == 0, errors.last

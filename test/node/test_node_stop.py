@@ -127,11 +127,11 @@ def test_a_static_mesh_whose_new_place_is_rejected_is_unknown(start_stream):
         for _ in range(2):
             stream.sent += 1
             peer.vertices("hand", hand(2.0), stamp=stream.sent, frame_id="world")
-        stream.node.frames_status(answered=stream.sent + taken)
+        stream.node.frames_status(processed=stream.sent + taken)
 
     taken = 1
     peer.vertices("table", TABLE, stamp=1, frame_id="world")
-    stream.node.frames_status(answered=taken)
+    stream.node.frames_status(processed=taken)
     hands()
     stream.expect(False)
     moved = TABLE + [0, 0, 1.9]
@@ -144,7 +144,7 @@ def test_a_static_mesh_whose_new_place_is_rejected_is_unknown(start_stream):
         rejected()
         if cause == "is not in use yet":
             taken += 1
-            stream.node.frames_status(answered=stream.sent + taken)
+            stream.node.frames_status(processed=stream.sent + taken)
             hands()
         stream.status("rejected", cause)
         stream.expect(True)
@@ -154,7 +154,7 @@ def test_a_static_mesh_whose_new_place_is_rejected_is_unknown(start_stream):
         peer.topology("table", FACES, 3)
         peer.vertices("table", TABLE, stamp=2, frame_id="world")
         taken += 1
-        stream.node.frames_status(answered=stream.sent + taken)
+        stream.node.frames_status(processed=stream.sent + taken)
         hands()
         stream.expect(False)
 
@@ -253,7 +253,7 @@ def test_a_publisher_of_static_transforms_that_ends_is_no_loss_and_hides_none(st
         publish(stays, "mount")
     for _ in range(5):
         used("mount")
-    rejected = stream.node.frames_status(answered=2 * stream.sent).get("transforms_rejected", "0")
+    rejected = stream.node.frames_status(processed=2 * stream.sent).get("transforms_rejected", "0")
     assert rejected == ("1" if lost else "0")
     if lost:
 
@@ -285,7 +285,7 @@ def test_a_robot_of_which_something_newer_is_rejected_is_unknown(start_stream):
     peer, stamp = stream.node.peer, 10**9
     peer.topology("table", FACES, 3)
     peer.vertices("table", TABLE, stamp=1)
-    stream.node.frames_status(answered=1)
+    stream.node.frames_status(processed=1)
     describe = peer.publisher(String, "robot_description", qos.DESCRIPTION)
     other = peer.node.create_publisher(JointState, "joint_states", 10)
 

@@ -42,11 +42,11 @@ def test_every_step_of_one_mesh(start_node, dtype):
         assert len(message.points) == len(message.normals) == 0
         found += assert_same_contacts(message, positions[k - 1], positions[k], scene_of(cloth=FACES))
     assert found > 100, "the scene is made to touch"
-    node.frames_status(received=6, answered=6, dropped=0, waiting=0)
+    node.frames_status(received=6, processed=6, dropped=0, waiting=0)
 
 
 def test_two_meshes_are_assembled_by_stamp(start_node):
-    """The second mesh comes late and in another precision; each answer joins equal stamps."""
+    """The second mesh comes late and in another precision; each result joins equal stamps."""
     node = start_node({"meshes": ["cloth", "net"], "frame_queue": 100, "outputs": ["points", "normals"]})
     scene = scene_of(cloth=FACES, net=FACES)
     node.peer.topology("net", FACES, N * N)
@@ -71,7 +71,7 @@ def test_two_meshes_are_assembled_by_stamp(start_node):
         assert np.array_equal(np.frombuffer(message.points).reshape(-1, 3), expected.points)
         assert np.array_equal(np.frombuffer(message.normals).reshape(-1, 3), expected.normals)
     assert between > 10, "the meshes are made to touch each other"
-    node.frames_status(received=10, answered=10, dropped=0)
+    node.frames_status(received=10, processed=10, dropped=0)
 
 
 def test_scene_options_reach_the_core(start_node):
@@ -91,7 +91,7 @@ def test_scene_options_reach_the_core(start_node):
     for name in ("cloth", "net", "floor"):
         node.peer.topology(name, FACES, N * N)
     node.peer.vertices("floor", floor, stamp=0)
-    node.frames_status(answered=1)
+    node.frames_status(processed=1)
     frames = []
     for k in range(3):
         parts = [sheet_positions(N, k), sheet_positions(N, k + 3, offset=0.004), floor]
@@ -101,7 +101,7 @@ def test_scene_options_reach_the_core(start_node):
         node.contacts(k)
     for k, message in enumerate(node.contacts(2), start=1):
         assert assert_same_contacts(message, frames[k - 1], frames[k], scene) > 0
-    node.frames_status(received=7, answered=7, dropped=0)
+    node.frames_status(received=7, processed=7, dropped=0)
 
 
 def test_topology_change_in_mid_stream(start_node):
@@ -118,7 +118,7 @@ def test_topology_change_in_mid_stream(start_node):
     node.peer.vertices("cloth", b[0], stamp=10, topology_version=2)
     node.frames_status(received=3, waiting=1)
     node.peer.topology("cloth", large, N * N, version=2)
-    node.frames_status(answered=3, waiting=0)
+    node.frames_status(processed=3, waiting=0)
     node.peer.vertices("cloth", b[1], stamp=11, topology_version=2)
     message = node.contacts(2)[1]
     assert fields.stamp_to_ns(message.start) == 10, "no motion from the old topology to the new one"
@@ -249,12 +249,12 @@ def test_markers_come_at_their_rate_only(start_node):
         node.peer.vertices("cloth", sheet_positions(N, k), stamp=k)
         node.contacts(k)
     node.wait_until(lambda: markers, "markers")
-    node.frames_status(answered=5)
+    node.frames_status(processed=5)
     assert len(markers) == 1, "the next one would be due in a thousand seconds"
 
 
 def test_simulated_time(start_node):
-    """The node's own stamps are of /clock; frames are answered whether it runs or not."""
+    """The node's own stamps are of /clock; frames are processed whether it runs or not."""
     node = start_node({"meshes": ["cloth"], "use_sim_time": True}, remaps=("/clock:=clock",))
     node.peer.topology("cloth", FACES, N * N)
     frames = [sheet_positions(N, k) for k in range(3)]
@@ -273,7 +273,7 @@ def test_simulated_time(start_node):
 
         node.wait_until(told, f"report at {seconds} s")
     node.peer.vertices("cloth", frames[2], stamp=2)
-    assert fields.stamp_to_ns(node.contacts(2)[1].header.stamp) == 2, "stamps of answers are those of the frames"
+    assert fields.stamp_to_ns(node.contacts(2)[1].header.stamp) == 2, "stamps of results are those of the frames"
 
 
 def test_meshes_at_rates_of_their_own(start_node):
@@ -321,13 +321,13 @@ def test_best_effort_input(start_node):
     publisher = node.peer.publisher(MeshVertices, "meshes/cloth/vertices", sensor)
     sent = 0
 
-    def answered():
+    def shown():
         nonlocal sent  # frame after frame: each of them may be lost
         publisher.publish(mesh_messages.vertices_message(sheet_positions(N, sent), sent))
         sent += 1
         return node.peer.received
 
-    message = node.wait_until(answered, "contacts")[0]
+    message = node.wait_until(shown, "contacts")[0]
     start, end = (fields.stamp_to_ns(stamp) for stamp in (message.start, message.header.stamp))
     assert start < end
     assert_same_contacts(message, sheet_positions(N, start), sheet_positions(N, end), scene_of(cloth=FACES))

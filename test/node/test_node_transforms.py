@@ -33,7 +33,7 @@ def test_pose_of_a_stream(start_node):
     topologies(node)
     for k in range(2):
         send(node, k, "hand")
-        node.frames_status(answered=2 * k + 2)
+        node.frames_status(processed=2 * k + 2)
     check(node.contacts(1)[0], 1)
     node.peer.vertices("net", parts(2)[2], 2 * SECOND, frame_id="foot")
     values = node.frames_status(dropped__net__frame_id=1)
@@ -57,7 +57,7 @@ def test_pose_of_integers(start_node):
     topologies(node)
     for k in range(2):
         send(node, k, "hand")
-        node.frames_status(answered=2 * k + 2)
+        node.frames_status(processed=2 * k + 2)
     check(node.contacts(1)[0], 1, Rigid.of((1, 0, 0), (0, 0, 0, 1)))
 
 
@@ -71,7 +71,7 @@ def through_topics(node, publish, publish_static, k):
     else:
         send(node, k, "hand")
         publish(transform("arm", "hand", HAND, k * SECOND))
-    node.frames_status(answered=2 * k + 2, waiting=0)
+    node.frames_status(processed=2 * k + 2, waiting=0)
 
 
 def test_transforms_of_geometry_msgs(start_node):

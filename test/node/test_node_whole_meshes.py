@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes that come as shape_msgs/Mesh or as markers of triangles: answered, rejected, recorded and computed again."""
+"""Meshes that come as shape_msgs/Mesh or as markers of triangles: processed, rejected, recorded and computed again."""
 
 import numpy as np
 from bag_tools import replayed
@@ -40,11 +40,11 @@ def test_a_stream_of_markers(start_node, tmp_path, hpccd):
     node = start_node({"meshes": ["cloth"], "mesh": {"cloth": {"input": "marker"}}, "record": str(path)})
     for k in range(4):
         send(node, "marker", marker_of(sheet(k), FACES, stamp=k + 1, frame_id="world"))
-        node.frames_status(answered=k + 1)
-    for k, answer in enumerate(node.contacts(3), start=1):
-        assert assert_same_contacts(answer, sheet(k - 1)[ORDER], sheet(k)[ORDER], scene_of(cloth=WELDED)) > 0
-        assert (answer.header.frame_id, fields.stamp_to_ns(answer.header.stamp)) == ("world", k + 1)
-    assert len({tuple(answer.topology_versions) for answer in node.peer.received}) == 1
+        node.frames_status(processed=k + 1)
+    for k, response in enumerate(node.contacts(3), start=1):
+        assert assert_same_contacts(response, sheet(k - 1)[ORDER], sheet(k)[ORDER], scene_of(cloth=WELDED)) > 0
+        assert (response.header.frame_id, fields.stamp_to_ns(response.header.stamp)) == ("world", k + 1)
+    assert len({tuple(response.topology_versions) for response in node.peer.received}) == 1
 
     # Another recorder comes in the middle, when all that the node knows of the topology was sent before.
     parameters = {"meshes": ["cloth"], "mesh.cloth.input": "marker"}
@@ -56,7 +56,7 @@ def test_a_stream_of_markers(start_node, tmp_path, hpccd):
     node.peer.await_readers("meshes/cloth/marker")
     node.wait_until(lambda: recorder.publishers(f"{node.namespace}/contacts"), "the second recorder to hear")
 
-    # What is rejected changes nothing of what is answered.
+    # What is rejected changes nothing of what is processed.
     stop = marker_of(sheet(4), FACES, stamp=5, frame_id="world")
     stop.action = Marker.DELETE
     send(node, "marker", stop)
@@ -71,10 +71,10 @@ def test_a_stream_of_markers(start_node, tmp_path, hpccd):
     node.frames_status(topologies_rejected__cloth__topology_conflict=1)
     for k in (4, 5):
         send(node, "marker", marker_of(sheet(k), FACES, stamp=k + 1, frame_id="world"))
-        node.frames_status(answered=k + 1)
-    answer = node.contacts(5)[-1]
-    assert_same_contacts(answer, sheet(4)[ORDER], sheet(5)[ORDER], scene_of(cloth=WELDED))
-    assert answer.topology_versions == node.peer.received[0].topology_versions
+        node.frames_status(processed=k + 1)
+    response = node.contacts(5)[-1]
+    assert_same_contacts(response, sheet(4)[ORDER], sheet(5)[ORDER], scene_of(cloth=WELDED))
+    assert response.topology_versions == node.peer.received[0].topology_versions
 
     # Half of the sheet is another mesh: its first frame is only a start.
     half = FACES[: len(FACES) // 2]
@@ -82,11 +82,13 @@ def test_a_stream_of_markers(start_node, tmp_path, hpccd):
     order, welded = half.reshape(-1)[first], vertex_of.reshape(-1, 3).astype(np.uint32)
     for k in (6, 7):
         send(node, "marker", marker_of(sheet(k), half, stamp=k + 1, frame_id="world"))
-        node.frames_status(answered=k + 1)
-    answer = node.contacts(6)[-1]
-    assert_same_contacts(answer, sheet(6)[order], sheet(7)[order], scene_of(cloth=welded))
-    assert answer.topology_versions != node.peer.received[0].topology_versions
-    node.wait_until(lambda: recorder.received[f"{node.namespace}/contacts"] == 3, "three answers in the late recording")
+        node.frames_status(processed=k + 1)
+    response = node.contacts(6)[-1]
+    assert_same_contacts(response, sheet(6)[order], sheet(7)[order], scene_of(cloth=welded))
+    assert response.topology_versions != node.peer.received[0].topology_versions
+    node.wait_until(
+        lambda: recorder.received[f"{node.namespace}/contacts"] == 3, "three responses in the late recording"
+    )
     bag.close()
     assert node.stop() == 0
 
@@ -95,30 +97,30 @@ def test_a_stream_of_markers(start_node, tmp_path, hpccd):
     replay, _ = replayed(late)
     assert (replay.verified, replay.diverged, replay.unverified) == (2, 0, 0)
     done = hpccd("replay", path)
-    assert done.returncode == 0 and "VERIFIED: 6 answers are equal" in done.stdout, done.stdout + done.stderr
+    assert done.returncode == 0 and "VERIFIED: 6 responses are equal" in done.stdout, done.stdout + done.stderr
     assert hpccd("doctor", path).returncode == 0
     drawn = hpccd("view", path, "-o", tmp_path / "step.png")
     assert drawn.returncode == 0, drawn.stderr
 
 
 def test_a_stream_of_shapes_within_a_room_of_one(start_node, tmp_path):
-    """A shape has no stamp: that of an answer is when its publisher sent it, which each reader is told alike."""
+    """A shape has no stamp: that of a response is when its publisher sent it, which each reader is told alike."""
     path = tmp_path / "run.mcap"
     room = sheet(9, offset=0.004)
     meshes = {"cloth": {"input": "shape"}, "room": {"input": "shape", "static": True, "self_collision": False}}
     node = start_node({"meshes": ["cloth", "room"], "mesh": meshes, "record": str(path)})
     send(node, "shape", shape_of(room, FACES), mesh="room")
-    node.frames_status(answered=1)
+    node.frames_status(processed=1)
     for k in range(4):
         send(node, "shape", shape_of(sheet(k), FACES))
-        node.frames_status(answered=k + 2)
+        node.frames_status(processed=k + 2)
     scene = scene_of(cloth=FACES)
     scene.add_mesh("room", FACES, n_vertices=N * N, static=True, self_collision=False)
-    answers = node.contacts(3)
-    for k, answer in enumerate(answers, start=1):
+    responses = node.contacts(3)
+    for k, response in enumerate(responses, start=1):
         frames = [np.concatenate([sheet(s), room]) for s in (k - 1, k)]
-        assert assert_same_contacts(answer, *frames, scene) > 0
-    stamps = [fields.stamp_to_ns(answer.header.stamp) for answer in answers]
+        assert assert_same_contacts(response, *frames, scene) > 0
+    stamps = [fields.stamp_to_ns(response.header.stamp) for response in responses]
     wrong = shape_of(sheet(0), FACES)
     wrong.triangles[3].vertex_indices[1] = N * N
     send(node, "shape", wrong)
@@ -145,7 +147,7 @@ def test_a_marker_in_a_frame_of_its_own(start_node):
         message.pose.position.z = 1.0
         message.pose.orientation.x, message.pose.orientation.w = 0.8, 0.6
         send(node, "marker", message)
-        node.frames_status(answered=k + 1)
+        node.frames_status(processed=k + 1)
     placed = [rigid.apply(local.apply(sheet(k)[ORDER])) for k in range(2)]
     assert_same_contacts(node.contacts(1)[0], *placed, scene_of(cloth=WELDED))
 

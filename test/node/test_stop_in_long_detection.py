@@ -23,7 +23,7 @@ def test_of_the_stream(start_node, tmp_path, number):
     for stamp, positions in enumerate((START, END)):
         for mesh in MESHES:
             node.peer.vertices(mesh, positions, stamp)
-        node.frames_status(received=2 * stamp + 2, answered=2, waiting=2 * stamp)
+        node.frames_status(received=2 * stamp + 2, processed=2, waiting=2 * stamp)
     assert node.stop(number) == 0, node.output()
     counts = {topic.partition("/meshes/")[2] or topic: count for topic, count in examine(own).counts.items()}
     assert counts == {f"{mesh}/{kind}": n for mesh in MESHES for kind, n in (("topology", 1), ("vertices", 2))}, (

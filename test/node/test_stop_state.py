@@ -275,7 +275,7 @@ def test_what_was_sent_before_a_clock_was_set_back_never_seems_young(state):
         state.times.now -= round(jump * SECOND)
         for step in range(50):
             if step == 3:
-                clear(state, hand=last, tip=last)  # a step that was answered late
+                clear(state, hand=last, tip=last)  # a step that was processed late
             assert cause(state) is not None
             state.times.pass_by(TIMEOUT / 10)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`hpccd_node --help` and `--version` answer at once, without ROS."""
+"""`hpccd_node --help` and `--version` result at once, without ROS."""
 
 import re
 import subprocess

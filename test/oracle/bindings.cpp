@@ -78,7 +78,7 @@ auto times_within(Test test) {
   };
 }
 
-// Answers about points (Q,4,3) or (Q,5,3) at rest.
+// Results about points (Q,4,3) or (Q,5,3) at rest.
 template <class T, class Points, class Of>
 auto at_rest(Of of) {
   return [of](const Array<double>& points, unsigned threads) {

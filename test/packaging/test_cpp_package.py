@@ -37,7 +37,7 @@ def configure(source: Path, build: Path, prefix: Path, *options: str) -> None:
 
 
 @pytest.fixture(scope="session")
-def answers(prefix, tmp_path_factory):
+def results(prefix, tmp_path_factory):
     """What the example prints, with the shared and with the static library."""
     printed = {}
     for kind, option in (("shared", "ON"), ("static", "OFF")):
@@ -50,12 +50,12 @@ def answers(prefix, tmp_path_factory):
     return printed
 
 
-def test_the_example_runs_with_either_library(answers):
-    assert answers["shared"] == answers["static"]
-    assert answers["shared"].startswith(f"hpccd {VERSION}\n")
+def test_the_example_runs_with_either_library(results):
+    assert results["shared"] == results["static"]
+    assert results["shared"].startswith(f"hpccd {VERSION}\n")
 
 
-def test_the_example_prints_the_contacts(answers):
+def test_the_example_prints_the_contacts(results):
     """Those of the same scene in Python."""
     n = 8
     i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
@@ -75,7 +75,7 @@ def test_the_example_prints_the_contacts(answers):
         expected += [(*map(int, row), f"{t:.4f}") for row, t in zip(contacts.ee, contacts.ee_toc, strict=True)]
         cloth = fallen
     found = []
-    for line in answers["shared"].splitlines():
+    for line in results["shared"].splitlines():
         if match := re.match(r"  vertex (\d+), face (\d+) at t = ([\d.]+)", line):
             found.append((int(match[1]), int(match[2]), match[3]))
         elif match := re.match(r"  edge (\d+)-(\d+), edge (\d+)-(\d+) at t = ([\d.]+)", line):

@@ -95,10 +95,10 @@ def test_the_messages_serve_to_ask_a_node(prefix, start_node):
         "print({l.split()[-1] for l in open('/proc/self/maps') if 'libhpccd' in l})\n"
         "print([name for name in sys.modules if name.startswith(('hpccd_ros', 'hpccd_core'))])\n"
     )
-    answer, module, loaded, ours = run(
+    result, module, loaded, ours = run(
         sys.executable, "-c", program, node.namespace, environment=environment
     ).splitlines()
-    assert answer == "3 pairs of meshes [inf, 0.5, inf]"
+    assert result == "3 pairs of meshes [inf, 0.5, inf]"
     assert module.startswith(str(prefix))
     assert len(loaded) > 5 and loaded.count("libhpccd") == loaded.count(f"{prefix}/lib/libhpccd")
     assert ours == "[]"

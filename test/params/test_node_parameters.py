@@ -28,7 +28,7 @@ print(node_parameters.fetch(node, "/served", float(sys.argv[1]))["number"])
 
 @pytest.fixture
 def served():
-    """A node with the parameter `number` that answers in a thread of its own."""
+    """A node with the parameter `number` that responds in a thread of its own."""
     environment.prepare()
     context = rclpy.Context()
     rclpy.init(context=context)
@@ -51,7 +51,7 @@ def ask(wait):
 
 
 def test_a_lost_response_is_asked_for_again(served):
-    """DDS loses it if the node discovers the client only after it has answered."""
+    """DDS loses it if the node discovers the client only after it has responded."""
     (service,) = (one for one in served.services if one.srv_type is GetParameters)
     send, lost = service.send_response, []
     service.send_response = lambda *response: send(*response) if lost else lost.append(response)
@@ -60,7 +60,7 @@ def test_a_lost_response_is_asked_for_again(served):
 
 
 def test_a_slow_node_has_its_time_for_each_request(served):
-    """It answers the copies of one request, sent after 1 s, before the next, for which it has 2 s at least."""
+    """It responds to the copies of one request, sent after 1 s, before the next, for which it has 2 s at least."""
     for service in served.services:
         if service.srv_type in (GetParameters, ListParameters):
             service.callback = delayed(service.callback)
@@ -69,8 +69,8 @@ def test_a_slow_node_has_its_time_for_each_request(served):
 
 
 def delayed(callback):
-    def answer(request, response):
+    def respond(request, response):
         time.sleep(1.2)
         return callback(request, response)
 
-    return answer
+    return respond

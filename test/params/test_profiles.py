@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The shipped profiles: a real node starts with each and answers as the profile says."""
+"""The shipped profiles: a real node starts with each and behaves as the profile says."""
 
 from pathlib import Path
 
@@ -23,7 +23,7 @@ def values_of(profile):
 
 
 def stream(node, mesh, frames):
-    """One after the other, so that none gives way; the answers."""
+    """One after the other, so that none gives way; the responses."""
     node.peer.topology(mesh, FACES, N * N)
     for k, vertices in enumerate(frames):
         node.peer.vertices(mesh, vertices, stamp=k + 1)
@@ -50,7 +50,7 @@ def test_static_environment(start_node):
     room = sheet_positions(N, 9, offset=0.004)
     node.peer.topology("room", FACES, N * N)
     node.peer.vertices("room", room, stamp=0)
-    node.frames_status(answered=1)
+    node.frames_status(processed=1)
     frames = [sheet_positions(N, k) for k in range(3)]
     scene = hc.Scene()
     scene.add_mesh("object", FACES)

@@ -110,11 +110,11 @@ def test_meshes_of_several_topologies_and_meshes_at_rest(hpccd, tmp_path):
     statue, _, ground = page.said["meshes"]
     assert len(statue["topologies"]) > 1
     assert [topology["frames"] for topology in ground["topologies"]] == [1], "what rests is stored once"
-    assert page.said["notes"][0].startswith("The recording holds no answers of a node")
+    assert page.said["notes"][0].startswith("The recording holds no results of a node")
     gaps = [step["gap"] for step in page.said["steps"]]
     numbers = [int(step["step"]) for step in page.said["steps"]]
     assert gaps == [0, *(np.diff(numbers) - 1)] and sum(gaps) > 0
-    assert f"{sum(gaps)} steps between the first and the last one: no answer" in " ".join(page.said["notes"])
+    assert f"{sum(gaps)} steps between the first and the last one: no result" in " ".join(page.said["notes"])
 
 
 def test_it_asks_for_nothing_and_runs_only_its_own_scripts(small_bag, tmp_path):
@@ -175,10 +175,10 @@ def test_what_is_missing_truncated_or_different_is_said(hpccd, small_bag, tmp_pa
     assert told["31"][1].startswith("Nothing is drawn")
     (said,) = told["32"]
     assert "the inputs taken make no frame at its start" in said
-    assert told["42"] == [f"2 steps right before this one: no answer {recording_page.GAP}."]
+    assert told["42"] == [f"2 steps right before this one: no result {recording_page.GAP}."]
     assert "contacts were recorded, now there are" in told["20"][0]
     total = next(step["total"] for step in page.said["steps"] if step["step"] == "60")
-    assert told["60"] == [f"The recorded answer held only the 5 earliest of {total} contacts (max_contacts)."]
+    assert told["60"] == [f"The recorded result held only the 5 earliest of {total} contacts (max_contacts)."]
     numbers = [step["step"] for step in page.said["steps"]]
     assert page.said["meshes"][0]["shown"][numbers.index("31")] is None
     assert page.said["meshes"][0]["shown"][numbers.index("32")] is not None, "its end is drawn"
@@ -187,7 +187,7 @@ def test_what_is_missing_truncated_or_different_is_said(hpccd, small_bag, tmp_pa
     for part in (
         "2 of 87 steps could not be computed",
         "1 of 87 steps were recorded with other contacts",
-        "1 of 87 steps had their recorded answer truncated",
+        "1 of 87 steps had their recorded result truncated",
         "The node had dropped 3 frames",
     ):
         assert part in notes

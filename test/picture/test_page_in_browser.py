@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page in a real browser: it draws, plays and answers to the pointer, complains of nothing and asks for nothing."""
+"""The page in a real browser: it draws, plays and reacts to the pointer, complains of nothing and asks for nothing."""
 
 import itertools
 

@@ -52,7 +52,7 @@ def test_a_recorder_that_came_late_says_it_at_once_and_at_the_end(start_node, ch
     node = start_node({"meshes": ["box"], "mesh.box.input": "pose"})
     node.peer.topology("box", np.array([[0, 1, 2]]), 3)
     node.peer.vertices("box", np.eye(3, dtype=np.float32), stamp=0)
-    node.frames_status(answered=1)
+    node.frames_status(processed=1)
     recorder = children.start(
         "recorder",
         "hpccd_ros.cli",

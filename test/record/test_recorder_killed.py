@@ -22,17 +22,17 @@ KILLS = int(os.environ.get("HPCCD_KILLS", "8"))
 FLUSH = 0.2  # s
 
 
-def wait_for_verified_answers(live, path, count):
-    """On a busy machine the node answers, for seconds, frames from before the recording; those are not verified."""
-    answers = count
+def wait_for_verified_results(live, path, count):
+    """On a busy machine the node processes, for seconds, frames from before the recording; those are not verified."""
+    results = count
     while True:
-        live.wait_for_answers(path, answers)
-        so_far = path.with_name(f"{path.stem}_{answers}.mcap")
+        live.wait_for_results(path, results)
+        so_far = path.with_name(f"{path.stem}_{results}.mcap")
         recover(path, so_far)
         replay, _ = replayed(so_far)
         if replay.verified >= count:
             return
-        answers = replay.recorded_answers + count
+        results = replay.recorded_results + count
 
 
 @pytest.mark.parametrize("compression", [pytest.param("none", marks=pytest.mark.long), "zstd"])
@@ -46,7 +46,7 @@ def test_killed_at_random_moments(children, namespace, tmp_path, compression):
     for number in range(KILLS // 2):
         path = tmp_path / f"killed{number}.mcap"
         recorder = live.recorder(path, "--flush", str(FLUSH), "--compression", compression)
-        wait_for_verified_answers(live, path, 4)
+        wait_for_verified_results(live, path, 4)
         time.sleep(generator.random())
         before = time.time_ns()
         flushed = path.read_bytes()

@@ -30,7 +30,7 @@ def _record(live, path, *options, stop=signal.SIGINT, node_options=(), publisher
     node = live.node(*node_options)
     recorder = live.recorder(path, *options)
     live.wait_for(live.publisher(*publisher_options))
-    live.wait_for_answers(path, FRAMES - 1)
+    live.wait_for_results(path, FRAMES - 1)
     recorder.process.send_signal(stop)
     live.wait_for(recorder)
     live.end(node)
@@ -96,23 +96,23 @@ def test_recorded_live_read_by_others_and_verified(live, namespace, tmp_path, st
 
 def test_split_and_compressed(live, tmp_path):
     path = tmp_path / "run"
-    # Slowly, so that answers of a busy node lie in the same file as their frames.
+    # Slowly, so that results of a busy node lie in the same file as their frames.
     _record(live, path, "--split-size", "0.04", "--compression", "zstd", publisher_options=["--rate", "8"])
     files = sorted(path.glob("*.mcap"))
     assert len(files) > 2
     with Reader(path) as reader:
         assert reader.message_count == sum(1 for _ in reader.messages())
     assert len(_verified(path)) == FRAMES - 1
-    # Each file alone: the steps whose both frames it holds. A split may fall between a frame and its answer; a file
-    # without any answer, as the first one of a busy machine, is computed from frame to frame.
+    # Each file alone: the steps whose both frames it holds. A split may fall between a frame and its result; a file
+    # without any result, as the first one of a busy machine, is computed from frame to frame.
     for file in files:
-        answered = [step for step in _verified_file(file) if step.recorded is not None]
-        assert sum(step.missing is None for step in answered) == _whole_steps(file)
+        compared = [step for step in _verified_file(file) if step.recorded is not None]
+        assert sum(step.missing is None for step in compared) == _whole_steps(file)
     assert sum(map(_whole_steps, files)) > 0
 
 
 def _whole_steps(file) -> int:
-    """Answers in the file whose both frames are in it too, as another reader finds them."""
+    """Results in the file whose both frames are in it too, as another reader finds them."""
     stamp = lambda time: (time.sec, time.nanosec)  # noqa: E731
     messages = [(topic.rpartition("/")[2], topic, message) for topic, _, _, message in read_by_rosbags(file)]
     frames = {}
@@ -120,8 +120,8 @@ def _whole_steps(file) -> int:
         if kind == "vertices":
             frames.setdefault(topic, set()).add(stamp(message.header.stamp))
     whole = set.intersection(*frames.values()) if len(frames) == 2 else set()
-    answers = [message for kind, _, message in messages if kind == "contacts"]
-    return sum({stamp(answer.start), stamp(answer.header.stamp)} <= whole for answer in answers)
+    results = [message for kind, _, message in messages if kind == "contacts"]
+    return sum({stamp(result.start), stamp(result.header.stamp)} <= whole for result in results)
 
 
 def _verified_file(file):
@@ -141,7 +141,7 @@ def _frames_from(path, seconds: float) -> int:
 
 
 def test_played_back_over_dds_gives_the_same_contacts(live, small_bag, tmp_path, children):
-    """Recording -> player -> a fresh node -> recorder: the answers are those of the first recording."""
+    """Recording -> player -> a fresh node -> recorder: the results are those of the first recording."""
     again = tmp_path / "again.mcap"
     # The recording has absolute names in the root namespace: the node listens there by remapping.
     rules = [
@@ -167,7 +167,7 @@ def test_played_back_over_dds_gives_the_same_contacts(live, small_bag, tmp_path,
     children.wait(lambda: node.has_printed("active: meshes"), "the node was not active", PATIENCE)
     recorder = live.recorder(again, "--ros-args", *remaps)
     live.wait_for(live.play(small_bag, "--rate", "2", "--from", "1.0"))
-    live.wait_for_answers(again, _frames_from(small_bag, 1.0) - 1)
+    live.wait_for_results(again, _frames_from(small_bag, 1.0) - 1)
     live.end(recorder)
     live.end(node)
 
@@ -215,7 +215,7 @@ def test_mesh_file_travels_with_the_recording(children, namespace, tmp_path):
     assert sum(step.total for step in steps) > 0
 
 
-def test_answers_are_played(children, small_bag):
+def test_results_are_played(children, small_bag):
     with Recording(small_bag) as recording:
         topics = recording.topics.values()
         begin = next(recording.messages()).log_time
@@ -237,7 +237,7 @@ def test_answers_are_played(children, small_bag):
 
     options = ("--publish", "--all", "--to", "0.5", "--wait", str(PATIENCE))
     children.start("player", "hpccd_ros.cli", "replay", str(small_bag), *options)
-    children.wait(all_there, f"{expected} answers were not heard", PATIENCE)
+    children.wait(all_there, f"{expected} results were not heard", PATIENCE)
     executor.shutdown()
     node.destroy_node()
     rclpy.shutdown(context=context)

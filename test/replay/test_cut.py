@@ -28,14 +28,14 @@ from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.bag.cut import Time, cut, seconds
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.bag.writer import BagWriter, Topic
-from hpccd_ros.middleware import answer_fields, contact_messages, fields, mesh_messages
+from hpccd_ros.middleware import contact_messages, fields, mesh_messages, result_fields
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
 
 N = 6
 SECOND = 10**9
 BEGAN = 10**18
-LATE = SECOND // 4  # from the last input of a step to its answer: some are under way at each cut
+LATE = SECOND // 4  # from the last input of a step to its result: some are under way at each cut
 FRAMES = 40  # ten a second
 PARAMETERS = {
     "meshes": ["cloth", "tool", "table"],
@@ -118,8 +118,8 @@ def _raw(inputs):
     return [(topic, serialize_message(message), BEGAN + round(came * SECOND)) for topic, message, came in inputs]
 
 
-def _answers(path):
-    """Those of a node that is as late as LATE, to all that the recording `path` without answers holds."""
+def _results(path):
+    """Those of a node that is as late as LATE, to all that the recording `path` without results holds."""
     with Recording(path) as recording:
         first = next(recording.messages()).log_time
         replay = Replay(recording, recorded_setup.of_recording(recording), backend="cpu")
@@ -127,7 +127,7 @@ def _answers(path):
             message = ContactArray(step=step.step, accuracy="exact", backend="cpu")
             message.header.stamp, message.start = fields.ns_to_stamp(step.end), fields.ns_to_stamp(step.start)
             contact_messages.fill_contacts(message, step.contacts, step.layout)
-            answer_fields.fill_bounds(message, step.bounds)
+            result_fields.fill_bounds(message, step.bounds)
             yield "contacts", serialize_message(message), first + round(step.at * SECOND) + LATE
 
 
@@ -136,7 +136,7 @@ def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("whole")
     inputs = _raw(_inputs())
     _write(folder / "silent.mcap", inputs)
-    _write(folder / "run.mcap", [*inputs, *_answers(folder / "silent.mcap")])
+    _write(folder / "run.mcap", [*inputs, *_results(folder / "silent.mcap")])
     return folder / "run.mcap"
 
 
@@ -166,7 +166,7 @@ def test_parts_that_begin_and_end_anywhere_are_verified(whole, tmp_path):
         found = _cut(whole, part, Time(begin), Time(end))
         replay, verified = _replayed(part)
         reached += len(verified)
-        # Those whose step began after the cut, and whose answer came before the end.
+        # Those whose step began after the cut, and whose result came before the end.
         expected = [step for step in steps if 0.1 + (step - 1) / 10 > begin / SECOND and _came(whole)[step] < end]
         assert set(expected) <= set(verified), (begin, end, expected, verified)
         received = [m for m in raw_messages(whole) if begin <= m.log_time - BEGAN < end]
@@ -178,9 +178,9 @@ def test_parts_that_begin_and_end_anywhere_are_verified(whole, tmp_path):
 
 @functools.cache
 def _came(path):
-    """Step -> when its answer came, ns after the beginning."""
-    answers = [message.log_time - BEGAN for message in raw_messages(path) if message.topic == "/contacts"]
-    return dict(zip(_replayed(path)[1], answers, strict=True))
+    """Step -> when its result came, ns after the beginning."""
+    results = [message.log_time - BEGAN for message in raw_messages(path) if message.topic == "/contacts"]
+    return dict(zip(_replayed(path)[1], results, strict=True))
 
 
 def test_two_parts_that_join_hold_every_message_once(whole, tmp_path):
@@ -224,12 +224,12 @@ def test_a_robot_whose_description_changed_is_replayed_in_two_parts(tmp_path, mo
     changed = round(2.013 * SECOND)
     inputs = [*_raw(_inputs()), ("robot_description", serialize_message(String(data=OTHER_CRANE)), BEGAN + changed)]
     _write(tmp_path / "silent.mcap", inputs)
-    answers = []
+    results = []
     for begin, end in ((None, Time(changed)), (Time(changed), None)):
         _cut(tmp_path / "silent.mcap", tmp_path / "part.mcap", begin, end)
-        # A node answers with the robot that it has.
-        answers += [row for row in _answers(tmp_path / "part.mcap") if begin is not None or row[2] < BEGAN + changed]
-    _write(tmp_path / "run.mcap", [*inputs, *answers])
+        # A node computes with the robot that it has.
+        results += [row for row in _results(tmp_path / "part.mcap") if begin is not None or row[2] < BEGAN + changed]
+    _write(tmp_path / "run.mcap", [*inputs, *results])
     done = hpccd("replay", "run.mcap")
     assert done.status == 2 and "robot crane: its description on robot_description changed 2.013000000 s" in done.err
     commands = re.findall(r"`hpccd ([^`]*)`", done.err)
@@ -241,7 +241,7 @@ def test_a_robot_whose_description_changed_is_replayed_in_two_parts(tmp_path, mo
         done = hpccd("replay", name, "--json", f"{name}.json")
         assert done.status == 0 and "VERIFIED: " in done.out, done
         verified += json.loads((tmp_path / f"{name}.json").read_text())[0]["verified"]
-    assert verified == len(answers) > 20
+    assert verified == len(results) > 20
 
 
 def test_stamps_name_frames(whole, tmp_path):

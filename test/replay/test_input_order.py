@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A replay takes recorded messages in the order that the node's answers list, and reports no false differences."""
+"""A replay takes recorded messages in the order that the node's results list, and reports no false differences."""
 
 import copy
 
@@ -108,7 +108,7 @@ def _static():
 
 
 def _equal_stamps():
-    """A recording of three runs; the answers of each are in the file before their last frame."""
+    """A recording of three runs; the results of each are in the file before their last frame."""
     heard = _topologies()
     for n in range(1, 28):
         heard += [_pose(1 + n % 9, n), _cloth(1 + n % 9, n)]
@@ -166,7 +166,7 @@ def _counts(replay):
     return replay.verified, replay.diverged, replay.unverified
 
 
-def _answers(messages):
+def _results(messages):
     return [one for one in messages if one.topic == "contacts"]
 
 
@@ -175,12 +175,12 @@ def _answers(messages):
 def test_the_order_of_the_node_is_followed(tmp_path, kind, early):
     parameters, heard, taken = KINDS[kind]()
     messages = run(tmp_path / "x.mcap", parameters, heard, list(taken), early)
-    answers = _answers(messages)
+    results = _results(messages)
     replay, _ = _replay(tmp_path / "x.mcap", parameters, messages)
-    assert _counts(replay) == (len(answers), 0, 0) and len(answers) >= 10
-    assert sum(one.message.total > 0 for one in answers) >= 5
+    assert _counts(replay) == (len(results), 0, 0) and len(results) >= 10
+    assert sum(one.message.total > 0 for one in results) >= 5
     if kind in ("shape", "static", "base"):  # that the order matters: without the lists these are not verified
-        for one in answers:
+        for one in results:
             one.message.inputs_before = one.message.start_inputs = 0
             one.message.input_topic, one.message.input_sent, one.message.input_flags = [], [], []
         replay, _ = _replay(tmp_path / "x.mcap", parameters, messages)
@@ -210,7 +210,7 @@ def test_parts_are_verified(tmp_path, kind):
     assert verified > 2 * len(distances)
 
 
-def test_distances_belong_to_the_frame_of_their_answer(tmp_path):
+def test_distances_belong_to_the_frame_of_their_result(tmp_path):
     parameters, heard, taken = _equal_stamps()
     parameters = {**parameters, "distances": True}
     messages = run(tmp_path / "x.mcap", parameters, heard, list(taken), early=True)
@@ -225,26 +225,26 @@ def test_distances_belong_to_the_frame_of_their_answer(tmp_path):
 
 @pytest.fixture
 def recorded(tmp_path):
-    """replay(change) of a recording after change(answers, messages), which may change the list."""
+    """replay(change) of a recording after change(results, messages), which may change the list."""
     parameters, heard, taken = _shape()
     messages = run(tmp_path / "x.mcap", parameters, heard, list(taken))
 
-    def replay(change=lambda answers, messages: None):
+    def replay(change=lambda results, messages: None):
         copies = [Recorded(one.topic, copy.deepcopy(one.message), one.log_time, one.sent) for one in messages]
-        change(_answers(copies), copies)
+        change(_results(copies), copies)
         return _replay(tmp_path / "x.mcap", parameters, copies)
 
     return replay
 
 
-AT = 5  # one of the eleven answers
+AT = 5  # one of the eleven results
 
 
-def test_a_wrong_answer_diverges(recorded):
+def test_a_wrong_result_diverges(recorded):
     assert _counts(recorded()[0]) == (11, 0, 0)
 
-    def change(answers, messages):
-        answers[AT].message.toc[0] = np.nextafter(answers[AT].message.toc[0], 2)
+    def change(results, messages):
+        results[AT].message.toc[0] = np.nextafter(results[AT].message.toc[0], 2)
 
     replay, steps = recorded(change)
     assert _counts(replay) == (10, 1, 0) and steps[AT].difference
@@ -252,7 +252,7 @@ def test_a_wrong_answer_diverges(recorded):
 
 @pytest.mark.parametrize("topic", ["meshes/cloth/vertices", "meshes/tool/vertices", "meshes/table/vertices"])
 def test_a_changed_message_diverges(recorded, topic):
-    def change(answers, messages):
+    def change(results, messages):
         vertices = [one for one in messages if one.topic == topic][6].message
         of_type = vertices.vertices_f32 if len(vertices.vertices_f32) else vertices.vertices_f64
         for place in range(2, len(of_type), 3):
@@ -263,8 +263,8 @@ def test_a_changed_message_diverges(recorded, topic):
 
 
 def test_a_list_in_another_order_is_not_verified(recorded):
-    def change(answers, messages):
-        listed = answers[AT].message
+    def change(results, messages):
+        listed = results[AT].message
         for name in ("input_topic", "input_sent"):
             setattr(listed, name, getattr(listed, name)[::-1])
 
@@ -273,14 +273,14 @@ def test_a_list_in_another_order_is_not_verified(recorded):
 
 
 def test_an_input_that_the_recording_lacks(recorded):
-    def change(answers, messages):
-        answers[AT].message.input_sent[0] += 1
+    def change(results, messages):
+        results[AT].message.input_sent[0] += 1
 
     replay, steps = recorded(change)
     assert replay.diverged == 0 and replay.unverified >= 1 and steps[AT].missing
     assert "sent at 1000000000" in steps[AT].missing and "which the recording lacks" in steps[AT].missing
 
-    def remove(answers, messages):
+    def remove(results, messages):
         messages.remove([one for one in messages if one.topic == "meshes/tool/vertices"][6])
 
     replay, _ = recorded(remove)
@@ -298,33 +298,33 @@ def test_an_input_that_the_recording_lacks(recorded):
     ],
 )
 def test_lists_that_cannot_be(recorded, field, value, says):
-    replay, steps = recorded(lambda answers, messages: setattr(answers[AT].message, field, value))
+    replay, steps = recorded(lambda results, messages: setattr(results[AT].message, field, value))
     assert replay.diverged == 0 and replay.unverified >= 1 and says in steps[AT].missing, steps[AT].missing
 
 
-def test_an_answer_without_its_list(recorded):
-    def change(answers, messages):
-        answers[AT].message.inputs_before = answers[AT].message.start_inputs = 0
+def test_a_result_without_its_list(recorded):
+    def change(results, messages):
+        results[AT].message.inputs_before = results[AT].message.start_inputs = 0
         for name in ("input_topic", "input_sent", "input_flags"):
-            setattr(answers[AT].message, name, [])
+            setattr(results[AT].message, name, [])
 
     replay, steps = recorded(change)
     assert replay.diverged == 0 and "does not list the inputs taken" in steps[AT].missing
 
 
-def test_an_answer_that_was_lost(recorded):
+def test_a_result_that_was_lost(recorded):
     """The next one lists less than was taken: a difference after it does not show that the node was wrong."""
 
-    def lose(answers, messages):
-        messages.remove(answers[AT])
+    def lose(results, messages):
+        messages.remove(results[AT])
 
-    def change(answers, messages):
-        lose(answers, messages)
-        answers[AT + 2].message.hash += 1
+    def change(results, messages):
+        lose(results, messages)
+        results[AT + 2].message.hash += 1
 
     assert recorded(lose)[0].diverged == 0
     replay, steps = recorded(change)
-    assert replay.diverged == 0 and "an earlier answer is missing" in steps[AT + 1].missing
+    assert replay.diverged == 0 and "an earlier result is missing" in steps[AT + 1].missing
 
 
 def _change_list(change):
@@ -362,25 +362,25 @@ FORGED = {
 
 @pytest.mark.parametrize("forged", FORGED)
 @pytest.mark.parametrize("kind", ["shape", "base", "events"])
-def test_forged_lists_excuse_no_answer(tmp_path, kind, forged):
-    """Only answers at the beginning of a recording can have begun before it."""
+def test_forged_lists_excuse_no_result(tmp_path, kind, forged):
+    """Only results at the beginning of a recording can have begun before it."""
     parameters, heard, taken = KINDS[kind]()
     messages = run(tmp_path / "x.mcap", parameters, heard, list(taken))
-    answers = _answers(messages)
-    FORGED[forged](answers[AT].message)
-    for one in answers[AT:]:
+    results = _results(messages)
+    FORGED[forged](results[AT].message)
+    for one in results[AT:]:
         one.message.hash ^= 12345
         one.message.total += 7
     replay, steps = _replay(tmp_path / "x.mcap", parameters, messages)
     assert not any(step.before_recording for step in steps), [step.missing for step in steps]
-    assert replay.verified == AT and replay.diverged + replay.unverified == len(answers) - AT
+    assert replay.verified == AT and replay.diverged + replay.unverified == len(results) - AT
     if forged.startswith("one less"):
-        assert steps[AT].missing == "its list does not continue that of the previous answer"
+        assert steps[AT].missing == "its list does not continue that of the previous result"
 
 
 def test_begun_in_the_middle(recorded):
-    def change(answers, messages):
-        first = answers[4].log_time - 5
+    def change(results, messages):
+        first = results[4].log_time - 5
         messages[:] = [one for one in messages if one.log_time > first or one.topic.endswith("topology")]
         tool = next(one for one in messages if one.topic == "meshes/tool/vertices")
         assert tool.log_time > first
@@ -390,9 +390,9 @@ def test_begun_in_the_middle(recorded):
 
 
 def test_split_files_begin_with_what_is_in_force(recorded):
-    def change(answers, messages):
+    def change(results, messages):
         again = [one for one in messages if one.topic.endswith("topology")]
-        messages += [Recorded(one.topic, one.message, answers[AT].log_time, one.sent) for one in again]
+        messages += [Recorded(one.topic, one.message, results[AT].log_time, one.sent) for one in again]
 
     replay, _ = recorded(change)
     assert _counts(replay) == (11, 0, 0) and not replay.not_taken.total()
@@ -413,17 +413,17 @@ def test_what_transforms_and_joints_were_before_the_recording_is_not_held_agains
         heard += [_joints(10**9 * k // 2, k), _base(10**9 * k // 2, k)]
     taken = [0, robots_known(["crane"]), *range(1, len(heard))][1:]
     messages = run(tmp_path / "x.mcap", ROBOT, heard, taken)
-    answers = _answers(messages)
-    begin = answers[9].log_time
+    results = _results(messages)
+    begin = results[9].log_time
     kept = [one for one in messages if one.log_time > begin or one.topic in ("robot_description", *TABLE)]
 
     def counts(wrong):
-        changed = [copy.deepcopy(one) if one is answers[wrong] else one for one in kept]
-        changed[kept.index(answers[wrong])].message.hash += 1
+        changed = [copy.deepcopy(one) if one is results[wrong] else one for one in kept]
+        changed[kept.index(results[wrong])].message.hash += 1
         replay, steps = _replay(tmp_path / "x.mcap", ROBOT, changed)
         return _counts(replay), sum(step.before_recording for step in steps)
 
-    late = len(answers) - 10
+    late = len(results) - 10
     (verified, diverged, unverified), before = counts(15)
     assert (diverged, unverified) == (0, 0) and verified + before == late and verified >= late - 4
     (verified, diverged, unverified), before = counts(45)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every answer of a correct node is verified, in whatever order it and its recorder received the topics."""
+"""Every result of a correct node is verified, in whatever order it and its recorder received the topics."""
 
 import subprocess
 import sys
@@ -16,7 +16,7 @@ def _recorded(start_node, folder, seed, recordings, ticks):
         stream.record(ticks)
     stream.end()
     found = [verified(path) for path in stream.recordings]
-    # Answers of later recordings may rest on what came before, and are excused: on a busy machine all of them.
+    # Results of later recordings may rest on what came before, and are excused: on a busy machine all of them.
     assert found[0] > 0
     return found
 
@@ -38,4 +38,4 @@ def test_many_recordings_on_a_busy_machine(start_node, tmp_path, seed):
         for process in busy:
             process.kill()
             process.wait()
-    print(f"seed {seed}: {found} answers verified")
+    print(f"seed {seed}: {found} results verified")

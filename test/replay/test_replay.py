@@ -17,7 +17,7 @@ from hpccd_ros.frames.drops import Input
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
 
-ANSWER = 60  # one of the 89 answers, with contacts of both kinds
+RESULT = 60  # one of the 89 results, with contacts of both kinds
 
 
 def _replay(path, **options):
@@ -30,11 +30,11 @@ def _dropped(replay):
     return replay.source.rejected[Input.VERTICES].by_mesh_and_reason()
 
 
-def _changed_answer(source, target, change, answer=ANSWER):
-    """Copy with one answer changed in place by `change(decoded)`."""
+def _changed_result(source, target, change, result=RESULT):
+    """Copy with one result changed in place by `change(decoded)`."""
 
     def edit(index, message, decoded):
-        if message.topic == "/contacts" and index == answer:
+        if message.topic == "/contacts" and index == result:
             change(decoded)
         return decoded
 
@@ -46,7 +46,7 @@ def _changed_answer(source, target, change, answer=ANSWER):
 def test_the_recording_of_the_repository_is_verified(small_bag, threads):
     replay, steps = _replay(small_bag, threads=threads, backend="cpu")
     assert (replay.verified, replay.diverged, replay.unverified) == (89, 0, 0)
-    assert replay.frames == 90 and len(steps) == replay.recorded_answers == 89
+    assert replay.frames == 90 and len(steps) == replay.recorded_results == 89
     assert sum(step.total for step in steps) == sum(step.recorded.total for step in steps) == 10_213
     assert [step.step for step in steps] == list(range(1, 90))
 
@@ -57,7 +57,7 @@ def test_an_unchanged_copy_is_verified(small_bag, tmp_path):
     assert (replay.verified, replay.diverged) == (89, 0)
 
 
-def test_answers_hold_the_versions_of_their_topologies(small_bag):
+def test_results_hold_the_versions_of_their_topologies(small_bag):
     _, steps = _replay(small_bag)
     assert all(list(step.recorded.topology_versions) == [0, 0] for step in steps)
 
@@ -122,14 +122,14 @@ def _set(name, value):
         (_set("mesh_a", np.full(1, 9, np.uint32)), r"malformed: mesh_a has 1 entries"),
     ],
 )
-def test_a_changed_answer_diverges_and_is_named(small_bag, tmp_path, change, says):
-    path = _changed_answer(small_bag, tmp_path / "changed.mcap", change)
+def test_a_changed_result_diverges_and_is_named(small_bag, tmp_path, change, says):
+    path = _changed_result(small_bag, tmp_path / "changed.mcap", change)
     replay, steps = _replay(path)
     assert (replay.verified, replay.diverged) == (88, 1)
-    assert replay.first_divergence is steps[ANSWER]
-    assert replay.first_divergence.step == ANSWER + 1
-    assert np.all(np.array([bool(s.difference) for s in steps]) == (np.arange(89) == ANSWER))
-    assert re.search(says, steps[ANSWER].difference), steps[ANSWER].difference
+    assert replay.first_divergence is steps[RESULT]
+    assert replay.first_divergence.step == RESULT + 1
+    assert np.all(np.array([bool(s.difference) for s in steps]) == (np.arange(89) == RESULT))
+    assert re.search(says, steps[RESULT].difference), steps[RESULT].difference
 
 
 def test_a_changed_vertex_diverges(small_bag, tmp_path):
@@ -146,7 +146,7 @@ def test_a_changed_vertex_diverges(small_bag, tmp_path):
     assert replay.first_divergence.step == 50
 
 
-def test_answers_without_their_frames_are_not_called_verified(small_bag, tmp_path):
+def test_results_without_their_frames_are_not_called_verified(small_bag, tmp_path):
     def edit(index, message, decoded):
         lost = message.topic == "/meshes/ball/vertices" and index == 40
         return None if lost else decoded
@@ -168,11 +168,11 @@ def test_stamps_that_are_no_time(small_bag, tmp_path):
     replay, steps = _replay(tmp_path / "stamps.mcap")
     assert (replay.verified, replay.diverged, replay.unverified) == (87, 0, 2)
     assert _dropped(replay) == {("ball", "malformed"): 1, ("cloth", "incomplete"): 1}
-    assert re.search("the answer is malformed: .*nanosec", steps[40].missing)
+    assert re.search("the result is malformed: .*nanosec", steps[40].missing)
 
 
 def test_frames_that_the_node_dropped(small_bag, tmp_path):
-    """Under overload the node answers from the last frame that it took to the latest: some frames have no answer."""
+    """Under overload the node steps from the last frame that it took to the latest: some frames have no result."""
 
     def edit(index, message, decoded):
         return None if message.topic == "/contacts" and index % 3 else decoded
@@ -192,8 +192,8 @@ def test_a_recording_that_began_in_the_middle(small_bag, tmp_path):
     assert sum(step.before_recording for step in steps) == 20
 
 
-def test_answers_before_their_frames(small_bag, tmp_path):
-    """The recorder may take the answer of a fast node before the vertices that it belongs to."""
+def test_results_before_their_frames(small_bag, tmp_path):
+    """The recorder may take the result of a fast node before the vertices that it belongs to."""
     with Recording(small_bag) as recording:
         writer = BagWriter(tmp_path / "early.mcap", info=recording.info)
         for topic in recording.topics.values():
@@ -266,29 +266,29 @@ def test_wrong_scene_parameters_diverge(small_bag, tmp_path):
 def test_replay_command(hpccd, small_bag, tmp_path):
     done = hpccd("replay", small_bag, "--csv", "steps.csv")
     assert done.returncode == 0, done.stderr
-    assert "VERIFIED: 89 answers are equal in every contact, time and hash (accuracy exact)" in done.stdout
+    assert "VERIFIED: 89 results are equal in every contact, time and hash (accuracy exact)" in done.stdout
     rows = list(csv.DictReader((tmp_path / "steps.csv").open()))
     assert len(rows) == 89 and {row["result"] for row in rows} == {"equal"}
     assert all(row["hash"] == row["recorded_hash"] for row in rows)
     again = hpccd("replay", small_bag, "--csv", "steps.csv")
     assert again.returncode == 2 and "not overwritten" in again.stderr
 
-    path = _changed_answer(small_bag, tmp_path / "changed.mcap", lambda d: _later(d, 0))
+    path = _changed_result(small_bag, tmp_path / "changed.mcap", lambda d: _later(d, 0))
     changed = hpccd("replay", path)
     assert changed.returncode == 1
-    assert "DIVERGED: 1 of 89 answers differ, first in step 61" in changed.stdout
+    assert "DIVERGED: 1 of 89 results differ, first in step 61" in changed.stdout
     assert "vertex " in changed.stdout and "now at t = " in changed.stdout
 
 
 def test_a_part_of_a_recording(hpccd, small_bag, tmp_path):
     with Recording(small_bag) as recording:
         first = next(recording.messages()).log_time
-        answers = [(m.log_time - first) * 1e-9 for m in recording.messages(["/contacts"])]
+        results = [(m.log_time - first) * 1e-9 for m in recording.messages(["/contacts"])]
     replay, steps = _replay(small_bag, begin=1.0, end=2.0)
-    assert [s.at for s in steps] == [at for at in answers if 1.0 <= at <= 2.0] and len(steps) > 10
+    assert [s.at for s in steps] == [at for at in results if 1.0 <= at <= 2.0] and len(steps) > 10
     assert (replay.verified, replay.diverged) == (len(steps), 0)
     done = hpccd("replay", small_bag, "--from", "1", "--to", "2", "--rate", "4", "--json", "part.json")
-    assert done.returncode == 0 and f"VERIFIED: {len(steps)} answers" in done.stdout
+    assert done.returncode == 0 and f"VERIFIED: {len(steps)} results" in done.stdout
     (row,) = json.loads((tmp_path / "part.json").read_text())
     assert (row["result"], row["verified"]) == ("VERIFIED", len(steps))
     done = hpccd("replay", small_bag, "--from", "1000")
@@ -300,7 +300,7 @@ def test_one_step_at_each_enter(hpccd, small_bag):
     assert done.returncode == 0, done.stderr
     lines = [line for line in done.stdout.splitlines() if "contacts, hash 0x" in line]
     assert len(lines) == 3 and all(line.endswith(", equal") for line in lines)
-    assert "VERIFIED: 3 answers" in done.stdout
+    assert "VERIFIED: 3 results" in done.stdout
 
 
 def test_replay_of_unusable_files(hpccd, small_bag, tmp_path):

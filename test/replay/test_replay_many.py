@@ -43,7 +43,7 @@ RESULTS = ["VERIFIED", "DIVERGED", "UNUSABLE", "COMPUTED"]
 
 def _check(done, folder):
     assert done.returncode == 1, done.stdout + done.stderr
-    assert "2 of 4 recordings without a difference, 177 answers verified, 1 diverged" in done.stdout
+    assert "2 of 4 recordings without a difference, 177 results verified, 1 diverged" in done.stdout
     rows = json.loads((folder / "all.json").read_text())
     assert [row["result"] for row in rows] == RESULTS
     assert [row["file"][-6:] for row in rows] == ["a.mcap", "b.mcap", "c.mcap", "d.mcap"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A replay computes with the separation that each answer tells, and checks the smallest distances that were told."""
+"""A replay computes with the separation that each result tells, and checks the smallest distances that were told."""
 
 import csv
 import dataclasses
@@ -17,7 +17,7 @@ from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.detect.step_detector import StepDetector
-from hpccd_ros.middleware import answer_fields, contact_messages, fields, snapshot_messages
+from hpccd_ros.middleware import contact_messages, fields, result_fields, snapshot_messages
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.frames import FrameSource
 from hpccd_ros.replay.recomputed import Replay
@@ -30,8 +30,8 @@ TOLD = [Separation(0.005), Separation(0.005), WIDE, WIDE, NONE, Separation(0.001
 
 @pytest.fixture(scope="module")
 def near_bag(tmp_path_factory):
-    """Some frames of the recording of the repository, with answers as a node of today gives them: file, and messages
-    [(topic, message)] of the answers."""
+    """Some frames of the recording of the repository, with results as a node of today gives them: file, and messages
+    [(topic, message)] of the results."""
     from sources import ROOT
 
     path = tmp_path_factory.mktemp("near") / "near.mcap"
@@ -46,12 +46,12 @@ def near_bag(tmp_path_factory):
             if len(frames) - len(completed) in FRAMES or "topology" in message.topic:
                 inputs.append(message)
         frames = [frames[k] for k in FRAMES]
-        answers = list(_answers(setup, frames))
-        _write(path, recording.info, inputs, answers)
-    return path, inputs, answers
+        results = list(_results(setup, frames))
+        _write(path, recording.info, inputs, results)
+    return path, inputs, results
 
 
-def _answers(setup, frames):
+def _results(setup, frames):
     layout = Layout.of(tuple(setup.meshes), frames[0].topologies)
     options = setup.options("exact", "cpu", 1)
     for first, last, separation in zip(frames, frames[1:], TOLD, strict=False):
@@ -60,14 +60,14 @@ def _answers(setup, frames):
         message = ContactArray(step=last.step, accuracy="exact", backend="cpu")
         message.header.stamp, message.start = fields.ns_to_stamp(last.stamp), fields.ns_to_stamp(first.stamp)
         contact_messages.fill_contacts(message, found.contacts, layout)
-        answer_fields.fill_separation(message, separation)
+        result_fields.fill_separation(message, separation)
         distances = DistanceArray(step=last.step, accuracy="exact", backend="cpu", header=message.header)
         snapshot_messages.fill_distances(distances, found.gaps, layout)
         yield message, distances
 
 
-def _write(path, info, inputs, answers, distances_first=False):
-    """The answers stand behind all frames: how late they come does not matter."""
+def _write(path, info, inputs, results, distances_first=False):
+    """The results stand behind all frames: how late they come does not matter."""
     info = {**info, "topics": info["topics"] | {"/distances": "distances"}}
     bag = BagWriter(path, info=info)
     kinds = {m.topic: f"hpccd/msg/Mesh{m.topic.rpartition('/')[2].capitalize()}" for m in inputs}
@@ -77,7 +77,7 @@ def _write(path, info, inputs, answers, distances_first=False):
     for message in inputs:
         bag.write(message.topic, message.data, message.log_time, message.publish_time, message.sequence)
     end = max(message.log_time for message in inputs)
-    for contacts, distances in answers:
+    for contacts, distances in results:
         pair = [("/contacts", contacts), ("/distances", distances)]
         for topic, message in reversed(pair) if distances_first else pair:
             end += 1
@@ -104,38 +104,38 @@ def _copy(message, **changes):
 
 @pytest.fixture
 def changed(near_bag, tmp_path):
-    """Replays a copy with changed fields of one answer. which: 0: of the contacts, 1: of the distances."""
+    """Replays a copy with changed fields of one result. which: 0: of the contacts, 1: of the distances."""
 
     def make(which, number=1, **changes):
-        path, inputs, answers = near_bag
-        answers = [list(pair) for pair in answers]
-        answers[number][which] = _copy(answers[number][which], **changes)
+        path, inputs, results = near_bag
+        results = [list(pair) for pair in results]
+        results[number][which] = _copy(results[number][which], **changes)
         with Recording(path) as recording:
             info = recording.info
         target = tmp_path / f"changed-{len(list(tmp_path.iterdir()))}.mcap"
-        _write(target, info, inputs, answers)
+        _write(target, info, inputs, results)
         return target
 
     return make
 
 
 @pytest.mark.parametrize("distances_first", [False, True])
-def test_each_answer_with_its_own_separation(near_bag, tmp_path, distances_first):
-    path, inputs, answers = near_bag
+def test_each_result_with_its_own_separation(near_bag, tmp_path, distances_first):
+    path, inputs, results = near_bag
     with Recording(path) as recording:
-        _write(tmp_path / "x.mcap", recording.info, inputs, answers, distances_first)
+        _write(tmp_path / "x.mcap", recording.info, inputs, results, distances_first)
     replay, steps = _replay(tmp_path / "x.mcap")
     assert _counts(replay) == _counts(replay.distances) == (7, 0, 0)
     assert [step.separation for step in steps] == TOLD
-    assert any(len(message.separations) and message.total for message, _ in answers)
+    assert any(len(message.separations) and message.total for message, _ in results)
 
 
 def test_the_command_tells_the_separations(near_bag, tmp_path, hpccd):
     done = hpccd("replay", near_bag[0], "--csv", "steps.csv", "--json", "all.json")
     assert done.returncode == 0, done.stdout + done.stderr
     told = "separation 0, cloth:ball:0.02; separation 0.001, ball:cloth:0; separation 0.005"
-    assert f"VERIFIED: 7 answers are equal in every contact, time and hash (accuracy exact; {told})" in done.stdout
-    assert "  7 answers about distances are equal, points included" in done.stdout
+    assert f"VERIFIED: 7 results are equal in every contact, time and hash (accuracy exact; {told})" in done.stdout
+    assert "  7 results about distances are equal, points included" in done.stdout
     rows = list(csv.DictReader((tmp_path / "steps.csv").open()))
     assert [row["separation"] for row in rows] == [separation.text for separation in TOLD]
     (row,) = json.loads((tmp_path / "all.json").read_text())
@@ -154,7 +154,7 @@ def test_the_command_tells_the_separations(near_bag, tmp_path, hpccd):
         ({"closest": [0.5]}, "malformed: closest has 1 coordinates"),
     ],
 )
-def test_an_answer_with_another_separation_diverges(changed, changes, says):
+def test_a_result_with_another_separation_diverges(changed, changes, says):
     replay, steps = _replay(changed(0, **changes))
     assert _counts(replay) == (6, 1, 0)
     assert replay.first_divergence is steps[1] and says in steps[1].difference, steps[1].difference
@@ -170,12 +170,12 @@ def test_distances_that_differ_are_named(changed, near_bag, hpccd):
         replay.distances.first
     )
     done = hpccd("replay", path)
-    assert done.returncode == 1 and "DIVERGED: 1 of 7 answers about distances differ, the first:" in done.stdout
-    assert "  7 answers are equal in every contact" in done.stdout and "VERIFIED" not in done.stdout
+    assert done.returncode == 1 and "DIVERGED: 1 of 7 results about distances differ, the first:" in done.stdout
+    assert "  7 results are equal in every contact" in done.stdout and "VERIFIED" not in done.stdout
 
 
 def test_distances_of_a_scene_without_pairs_are_verified(near_bag, tmp_path, hpccd):
-    """There are no distances to measure, and each answer says so."""
+    """There are no distances to measure, and each result says so."""
     path, inputs, _ = near_bag
     with Recording(path) as recording:
         info = recording.info
@@ -185,14 +185,14 @@ def test_distances_of_a_scene_without_pairs_are_verified(near_bag, tmp_path, hpc
         setup = recorded_setup.of_recording(recording)
         source = FrameSource(setup, recording.topics)
         frames = [frame for message in recording.messages(source.topics) for frame in source.push(message)]
-    answers = list(_answers(setup, frames))
-    assert len(answers) == 7 and not any(len(distances.distance) for _, distances in answers)
-    _write(tmp_path / "x.mcap", info, inputs, answers)
+    results = list(_results(setup, frames))
+    assert len(results) == 7 and not any(len(distances.distance) for _, distances in results)
+    _write(tmp_path / "x.mcap", info, inputs, results)
     done = hpccd("replay", "x.mcap")
-    assert done.returncode == 0 and "  7 answers about distances are equal" in done.stdout, done.stdout + done.stderr
+    assert done.returncode == 0 and "  7 results about distances are equal" in done.stdout, done.stdout + done.stderr
 
 
-def test_answers_from_before_there_were_directions_are_verified(changed):
+def test_results_from_before_there_were_directions_are_verified(changed):
     assert _counts(_replay(changed(1, direction=[], approach_speed=[]))[0].distances) == (7, 0, 0)
 
 
@@ -219,7 +219,7 @@ def test_distances_without_their_frame_are_not_called_verified(changed, near_bag
     path = changed(1, header=header)
     assert _counts(_replay(path)[0].distances) == (6, 0, 1)
     done = hpccd("replay", path)
-    assert done.returncode == 1 and "1 answers about distances NOT VERIFIED, the first: distances at" in done.stdout
+    assert done.returncode == 1 and "1 results about distances NOT VERIFIED, the first: distances at" in done.stdout
     before = _copy(header, stamp=Time(sec=1))
     assert _counts(_replay(changed(1, header=before))[0].distances) == (6, 0, 0), "it began before the recording did"
     negative = _copy(header, stamp=Time(sec=-1))
@@ -228,9 +228,9 @@ def test_distances_without_their_frame_are_not_called_verified(changed, near_bag
 
 def test_the_bag_is_what_it_says(near_bag):
     """Made by this package: the core alone finds the same."""
-    path, _, answers = near_bag
+    path, _, results = near_bag
     _, steps = _replay(path)
-    for step, (message, _), separation in zip(steps, answers, TOLD, strict=True):
+    for step, (message, _), separation in zip(steps, results, TOLD, strict=True):
         scene = hc.Scene()
         for name, topology in zip(("cloth", "ball"), step.end_frame.topologies, strict=True):
             self_collision = name != "ball"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The answers about the parts of a step are that about the step."""
+"""The results about the parts of a step are that about the step."""
 
 from dataclasses import replace
 from itertools import pairwise

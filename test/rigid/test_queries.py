@@ -6,14 +6,14 @@
 
 import numpy as np
 import pytest
-from oracle import rigid_answers
-from oracle.rigid_answers import ask, judge
+from oracle import rigid_results
 from oracle.rigid_queries import KINDS, MOTIONS, random_queries
+from oracle.rigid_results import ask, judge
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("motion", MOTIONS)
-def test_answers_against_the_truth(motion, kind):
+def test_results_against_the_truth(motion, kind):
     queries = random_queries(np.random.default_rng(11), 500, kind, motion)
     verdict = judge(queries, ask(queries))
     assert verdict.right, verdict
@@ -23,6 +23,6 @@ def test_answers_against_the_truth(motion, kind):
 
 def test_a_bound_that_is_too_small_is_found_out(monkeypatch):
     """With a tenth of it left out some are missed: the queries come so near."""
-    monkeypatch.setattr(rigid_answers, "grown", lambda d, a, b: d + 0.9 * (a.sum + b.sum))
+    monkeypatch.setattr(rigid_results, "grown", lambda d, a, b: d + 0.9 * (a.sum + b.sum))
     queries = random_queries(np.random.default_rng(12), 500, "vf", "screws")
     assert judge(queries, ask(queries)).missed > 0

@@ -175,8 +175,8 @@ def test_node_reports_the_contacts_of_a_scene(name, size, listen, children, tmp_
     made.communicate()
 
     listener = listen(scene, "/whole")
-    answers = []
-    listener.node.create_subscription(ContactArray, "contacts", answers.append, QoSProfile(depth=1000))
+    results = []
+    listener.node.create_subscription(ContactArray, "contacts", results.append, QoSProfile(depth=1000))
     # Queues as long as the scene: no frame may be dropped here, however slow the machine.
     node = start(
         "hpccd_ros.node",
@@ -203,13 +203,13 @@ def test_node_reports_the_contacts_of_a_scene(name, size, listen, children, tmp_
             detector = hpccd_core.Detector(scenes.core_scene(scene, frame.index))
             expected[frame.index] = detector.detect(before.stacked(), frame.stacked())
     assert sum(len(c) for c in expected.values()) > 100
-    listener.wait(lambda: len(answers) >= 2, publisher)
+    listener.wait(lambda: len(results) >= 2, publisher)
     node.send_signal(signal.SIGSTOP)
     time.sleep(0.2)  # four frames; while the statue breaks each has a topology, and the queue of these holds ten
     node.send_signal(signal.SIGCONT)
-    listener.wait(lambda: len(answers) >= len(expected), publisher)
-    assert {a.step: a.hash for a in answers} == {k: c.hash for k, c in expected.items()}
-    assert {a.step: a.total for a in answers} == {k: len(c) for k, c in expected.items()}
+    listener.wait(lambda: len(results) >= len(expected), publisher)
+    assert {a.step: a.hash for a in results} == {k: c.hash for k, c in expected.items()}
+    assert {a.step: a.total for a in results} == {k: len(c) for k, c in expected.items()}
     node.send_signal(signal.SIGINT)
     assert node.wait(PATIENCE) == 0
 

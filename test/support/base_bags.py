@@ -9,7 +9,7 @@ from sources import ROOT
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.detect.step_detector import StepDetector
-from hpccd_ros.middleware import answer_fields, contact_messages, snapshot_messages
+from hpccd_ros.middleware import contact_messages, result_fields, snapshot_messages
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
 
@@ -56,11 +56,11 @@ def of_everything(folder) -> Bag:
     """A mesh of float64 vertices, one of point clouds in a moving frame, and a static one from a file."""
     silent, whole = folder / "silent.mcap", folder / "whole.mcap"
     _write(silent, [])
-    _write(whole, _answers(silent))
+    _write(whole, _results(silent))
     return Bag.read(whole)
 
 
-def _write(path, answers):
+def _write(path, results):
     store = typestore()
     topics = {
         "/transforms": ("transforms", "geometry_msgs/msg/TransformStamped"),
@@ -90,7 +90,7 @@ def _write(path, answers):
 
     for message in _inputs(Maker(store)):
         write(*message)
-    for contacts, distances in answers:
+    for contacts, distances in results:
         write("/contacts", contacts)
         write("/distances", distances)
     bag.close()
@@ -165,7 +165,7 @@ def _inputs(make):
         yield "/meshes/net/points", make.cloud((k + 1) * SECOND, grid * [1, -1, 1] - wave * [0, 0, 1])
 
 
-def _answers(path):
+def _results(path):
     """The results of a node as rosbags' messages: contacts and smallest distances of each step."""
     from hpccd.msg import ContactArray, DistanceArray
 
@@ -186,7 +186,7 @@ def _answers(path):
         for step in Replay(recording, setup, outputs=("points", "normals"), backend="cpu").steps():
             contacts = ContactArray(step=step.step, accuracy="exact", backend="cpu")
             contact_messages.fill_contacts(contacts, step.contacts, step.layout)
-            answer_fields.fill_separation(contacts, step.separation)
+            result_fields.fill_separation(contacts, step.separation)
             distances = DistanceArray(step=step.step, accuracy="exact", backend="cpu")
             snapshot_messages.fill_distances(distances, detector.distances(step.end_frame), step.layout)
             header = make.header(step.end, "world")

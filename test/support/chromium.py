@@ -151,11 +151,11 @@ class Chromium:
         while data:
             data = data[os.write(self._write, data) :]
         while True:
-            answer = self._receive()
-            if answer.get("id") == self._number:
-                assert "error" not in answer, answer
-                return answer["result"]
-            self._note(answer)
+            response = self._receive()
+            if response.get("id") == self._number:
+                assert "error" not in response, response
+                return response["result"]
+            self._note(response)
 
     def _receive(self, timeout=120.0):
         while b"\0" not in self._buffer:

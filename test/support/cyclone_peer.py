@@ -21,7 +21,7 @@ from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
 PATIENCE = 240.0  # s
-MOST_WAIT = 5.0  # s for an answer before the next frame: one may be lost, see test_interop_cyclonedds.py
+MOST_WAIT = 5.0  # s for a result before the next frame: one may be lost, see test_interop_cyclonedds.py
 
 
 def qos(depth: int, latched: bool = False) -> Qos:
@@ -44,10 +44,10 @@ def header(stamp: int) -> types.Header:
     return types.Header(types.Time(0, stamp), "lab")
 
 
-def as_dict(answer: types.ContactArray) -> dict:
+def as_dict(result: types.ContactArray) -> dict:
     # Not dataclasses.asdict of the whole: it would copy long lists element by element.
-    fields = {field.name: getattr(answer, field.name) for field in dataclasses.fields(answer)}
-    return {**fields, "header": dataclasses.asdict(answer.header), "start": dataclasses.asdict(answer.start)}
+    fields = {field.name: getattr(result, field.name) for field in dataclasses.fields(result)}
+    return {**fields, "header": dataclasses.asdict(result.header), "start": dataclasses.asdict(result.start)}
 
 
 def main(namespace: str, source: str, target: str) -> None:
@@ -64,24 +64,24 @@ def main(namespace: str, source: str, target: str) -> None:
     contacts = DataReader(participant, topic("contacts", types.ContactArray), qos(20))
     topology.write(types.MeshTopology(header(0), 3, len(frames[0]), faces.ravel().tolist(), []))
     wait(lambda: vertices.get_matched_subscriptions() and contacts.get_matched_publications(), "node")
-    answers = []
+    results = []
 
-    def answered(step: int) -> bool:
-        answers.extend(sample for sample in contacts.take(10) if sample.sample_info.valid_data)
-        return any(answer.step == step for answer in answers)
+    def has_result(step: int) -> bool:
+        results.extend(sample for sample in contacts.take(10) if sample.sample_info.valid_data)
+        return any(result.step == step for result in results)
 
     for k, frame in enumerate(frames):
         flat = frame.ravel().tolist()
         vertices.write(types.MeshVertices(header(k + 1), 3, k, [] if double else flat, flat if double else []))
         deadline = time.monotonic() + MOST_WAIT
-        while k and not answered(k) and time.monotonic() < deadline:
+        while k and not has_result(k) and time.monotonic() < deadline:
             time.sleep(0.01)
-    # A frame has no answer before the one behind it: all but one of the answers come, sooner or later.
+    # A frame has no result before the one behind it: all but one of the results come, sooner or later.
     steps = len(frames) - 1
-    wait(lambda: answered(steps) + len(answers) >= steps, f"{steps - 1} answers")
+    wait(lambda: has_result(steps) + len(results) >= steps, f"{steps - 1} results")
     assert not {"rclpy", "hpccd"} & sys.modules.keys(), "this peer is to be independent of ROS"
     with open(target, "w", encoding="utf-8") as file:
-        json.dump([as_dict(answer) for answer in answers], file)
+        json.dump([as_dict(result) for result in results], file)
 
 
 if __name__ == "__main__":

@@ -43,7 +43,7 @@ class Goals:
             self._client.send_goal_async(client.goal_from_request(request), feedback_callback=goal.heard)
             for request, goal in zip(requests, goals, strict=True)
         ]
-        self.wait_until(lambda: all(future.done() for future in futures), "answers to the goals")
+        self.wait_until(lambda: all(future.done() for future in futures), "results to the goals")
         for goal, future in zip(goals, futures, strict=True):
             goal.handle = future.result()
             if goal.handle.accepted:
@@ -74,5 +74,5 @@ class Goal:
     def cancel(self):
         """How many goals the node says that it cancels."""
         future = self.handle.cancel_goal_async()
-        self._goals.wait_until(future.done, "answer to the request to cancel")
+        self._goals.wait_until(future.done, "result to the request to cancel")
         return len(future.result().goals_canceling)

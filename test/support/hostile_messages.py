@@ -47,8 +47,8 @@ def payload_lengths(rng, bag):
 
 
 @kind
-def changed_answer(rng, bag):
-    def change(put, answer):
+def changed_result(rng, bag):
+    def change(put, result):
         name = rng.choice(
             (
                 "kind",
@@ -69,7 +69,7 @@ def changed_answer(rng, bag):
                 "tested_features",
             )
         )
-        value = getattr(answer, name)
+        value = getattr(result, name)
         if name in ("first_toc", "total", "truncated", "hash", "step"):
             put(
                 name,
@@ -107,7 +107,7 @@ def changed_answer(rng, bag):
 def changed_separation(rng, bag):
     """Other separations than those used for the contacts, or invalid ones."""
 
-    def change(put, answer):
+    def change(put, result):
         name = rng.choice(("minimum_separation", "separation_mesh_a", "separation_mesh_b", "separations", "all"))
         length = rng.choice((0.0, -0.0, 5e-324, 1e-3, 0.002, 0.5, 1e150, 1e300, -1.0, math.nan, math.inf))
         if name == "minimum_separation":
@@ -117,7 +117,7 @@ def changed_separation(rng, bag):
             put("separation_mesh_b", np.array([1, rng.choice((0, 1))], np.uint32))
             put("separations", np.array([length, rng.choice((0.0, 1e-3))]))
         else:
-            value = getattr(answer, name)
+            value = getattr(result, name)
             count = rng.choice((0, len(value), len(value) + 1, 1000))
             wrong = length if name == "separations" else rng.choice(NUMBERS)
             put(name, np.full(count, wrong, value.dtype))
@@ -129,9 +129,9 @@ def changed_separation(rng, bag):
 def changed_distances(rng, bag):
     """Changed distances, if the recording has any; otherwise contacts of meshes that do not exist."""
 
-    def change(put, answer):
+    def change(put, result):
         name = rng.choice(("kind", "mesh_a", "mesh_b", "features_a", "features_b", "distance", "points"))
-        value = getattr(answer, name).copy()
+        value = getattr(result, name).copy()
         if rng.random() < 0.5 and len(value):
             value[rng.randrange(len(value))] = rng.choice((0, 1, 2, 255) if value.dtype == np.uint8 else NUMBERS)
         else:
@@ -140,7 +140,7 @@ def changed_distances(rng, bag):
 
     topic = next((channel.topic for channel in bag.channels if channel.topic.endswith("distances")), None)
     if topic is None:
-        return decoded(bag, topic_of(bag, "contacts"), rng, lambda put, answer: put("mesh_names", ["cloth", ""]))
+        return decoded(bag, topic_of(bag, "contacts"), rng, lambda put, result: put("mesh_names", ["cloth", ""]))
     return decoded(bag, topic, rng, change)
 
 
@@ -151,9 +151,9 @@ def contact_under_another_name(rng, bag):
     topology = bag.of_topic(f"/meshes/{info_of(bag)['parameters']['meshes'][0]}/topology")[0]
     first = store.deserialize_cdr(topology.data, name).n_vertices
 
-    def change(put, answer):
-        mesh, features = answer.mesh_a.copy(), answer.features_a.copy()
-        of_edges = answer.kind == 1
+    def change(put, result):
+        mesh, features = result.mesh_a.copy(), result.features_a.copy()
+        of_edges = result.kind == 1
         for row in np.flatnonzero(of_edges | True)[:5]:
             shift = first if mesh[row] == 1 else -first
             mesh[row] = 1 - min(1, mesh[row])
@@ -168,9 +168,9 @@ def contact_under_another_name(rng, bag):
 
 @kind
 def unused_entry_used(rng, bag):
-    def change(put, answer):
-        if len(answer.kind) and answer.kind[0] == 0:
-            features = answer.features_a.copy()
+    def change(put, result):
+        if len(result.kind) and result.kind[0] == 0:
+            features = result.features_a.copy()
             features[1] = 5
             put("features_a", features)
 
@@ -179,9 +179,9 @@ def unused_entry_used(rng, bag):
 
 @kind
 def no_contacts_claimed(rng, bag):
-    def change(put, answer):
+    def change(put, result):
         for name in ("kind", "mesh_a", "mesh_b", "features_a", "features_b", "toc", "points", "normals"):
-            put(name, getattr(answer, name)[:0])
+            put(name, getattr(result, name)[:0])
         put("truncated", rng.random() < 0.5)
         if rng.random() < 0.5:
             put("total", 0)

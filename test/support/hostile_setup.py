@@ -287,7 +287,7 @@ def another_question(rng, bag):
     info["parameters"][name] = rng.choice(values)
     set_info(bag, info)
     if name == "report" and rng.random() < 0.5:
-        KINDS["changed_answer"](rng, bag)
+        KINDS["changed_result"](rng, bag)
 
 
 @kind

@@ -72,7 +72,7 @@ class Live:
             *self._remap,
         )
 
-    def wait_for_answers(self, path, count: int):
+    def wait_for_results(self, path, count: int):
         """Wait until `count` contact messages are flushed to the recording `path`, a file or a folder of files.
 
         The publisher ends when its messages are acknowledged; the node may still compute the last results then.
@@ -81,7 +81,7 @@ class Live:
         recorded = lambda: sum(  # noqa: E731
             number for file in files() for topic, number in examine(file).counts.items() if topic.endswith("/contacts")
         )
-        self._children.wait(lambda: recorded() >= count, f"{count} answers were not recorded", PATIENCE)
+        self._children.wait(lambda: recorded() >= count, f"{count} results were not recorded", PATIENCE)
 
     def play(self, path, *options: str):
         """Start publishing a recording, to a node and a recorder."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A simulator in another network namespace: publishes a mesh until a result arrives.
 
-`python network_peer.py NAMESPACE SECONDS`; prints JSON: {"answer": {"start", "step", "hash", "total"} or null,
+`python network_peer.py NAMESPACE SECONDS`; prints JSON: {"response": {"start", "step", "hash", "total"} or null,
 "listeners"}; start, step: numbers of the two frames.
 """
 
@@ -24,19 +24,19 @@ def main(namespace: str, seconds: float) -> None:
     node = rclpy.create_node("simulation", namespace=namespace)
     topology = node.create_publisher(MeshTopology, "meshes/cloth/topology", qos.TOPOLOGY)
     vertices = node.create_publisher(MeshVertices, "meshes/cloth/vertices", qos.vertices("reliable", 10))
-    answers: list[ContactArray] = []
-    node.create_subscription(ContactArray, "contacts", answers.append, qos.CONTACTS)
+    responses: list[ContactArray] = []
+    node.create_subscription(ContactArray, "contacts", responses.append, qos.CONTACTS)
     topology.publish(mesh_messages.topology_message(sheet_faces(N), N * N))
     deadline, step, listeners = time.monotonic() + seconds, 0, 0
-    while not answers and time.monotonic() < deadline:
+    while not responses and time.monotonic() < deadline:
         vertices.publish(mesh_messages.vertices_message(sheet_positions(N, step), step + 1, step=step))
         listeners = max(listeners, vertices.get_subscription_count())
         step += 1
         rclpy.spin_once(node, timeout_sec=0.1)
-    answer = {key: getattr(answers[0], key) for key in ("step", "hash", "total")} if answers else None
-    if answer:
-        answer["start"] = fields.stamp_to_ns(answers[0].start) - 1
-    print(json.dumps({"answer": answer, "listeners": listeners}), flush=True)
+    response = {key: getattr(responses[0], key) for key in ("step", "hash", "total")} if responses else None
+    if response:
+        response["start"] = fields.stamp_to_ns(responses[0].start) - 1
+    print(json.dumps({"response": response, "listeners": listeners}), flush=True)
     node.destroy_node()
     rclpy.shutdown()
 

@@ -14,7 +14,7 @@ def call(node, kind, name, request):
     client = node.peer.node.create_client(kind, f"hpccd/{name}")
     node.wait_until(client.service_is_ready, f"service {name}")
     future = client.call_async(request)
-    node.wait_until(future.done, f"answer of {name}")
+    node.wait_until(future.done, f"result of {name}")
     return future.result()
 
 

@@ -83,9 +83,9 @@ class RandomStream:
                     )
                 )
                 assert set_parameter(self._node, name, self._rng.choice(values)).successful
-        answers = -1
-        while answers != len(self._peer.received):  # those that wait for detection belong to this recording
-            answers = len(self._peer.received)
+        results = -1
+        while results != len(self._peer.received):  # those that wait for detection belong to this recording
+            results = len(self._peer.received)
             self._spin(0.7)
 
     def next_recording(self) -> None:

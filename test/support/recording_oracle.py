@@ -26,7 +26,7 @@ FIELDS = ("kind", "mesh_a", "mesh_b", "features_a", "features_b", "toc")
 
 
 class Oracle:
-    """answers: all results in the recording `path`."""
+    """results: all results in the recording `path`."""
 
     def __init__(self, path):
         bag = Bag.read(path)
@@ -46,19 +46,19 @@ class Oracle:
             if channel.topic in roles:
                 schema = schemas[channel.schema_id]
                 self.found[str(roles[channel.topic])].append(_decode(store, message.data, schema.name))
-        self.answers = self.found["contacts"]
+        self.results = self.found["contacts"]
         self.transforms = TransformBuffer()
         for role in ("transforms_static", "transforms"):
             for message in self.found[role]:
                 self._take_transform(message, role == "transforms_static")
 
     def steps(self) -> list[tuple[int, int, int]]:
-        """(step, start, end) of each answer."""
-        return [(answer.step, _ns(answer.start), _ns(answer.header.stamp)) for answer in self.answers]
+        """(step, start, end) of each result."""
+        return [(result.step, _ns(result.start), _ns(result.header.stamp)) for result in self.results]
 
     def untruths(self) -> list[str | None]:
         """For each result, why it does not follow from its positions; None if it does."""
-        return [self._untruth_of(answer) for answer in self.answers]
+        return [self._untruth_of(result) for result in self.results]
 
     def _of(self, mesh, name, otherwise):
         value = self.given.get(f"mesh.{mesh}.{name}")
@@ -120,23 +120,23 @@ class Oracle:
             xyz = rigid.apply(xyz.astype(np.float64))
         return [(topology.faces.reshape(-1, 3), topology.n_vertices, xyz)] if len(xyz) == topology.n_vertices else []
 
-    def _untruth_of(self, answer):
-        start, end = _ns(answer.start), _ns(answer.header.stamp)
+    def _untruth_of(self, result):
+        start, end = _ns(result.start), _ns(result.header.stamp)
         ends = [self._positions(mesh, end) for mesh in self.meshes]
         starts = [self._positions(mesh, start) for mesh in self.meshes]
         why = NOT_THERE
-        # A stamp may come twice: one of the frames must give the answer.
+        # A stamp may come twice: one of the frames must give the result.
         for chosen in itertools.islice(itertools.product(*starts, *ends), 64):
             first, last = chosen[: len(self.meshes)], chosen[len(self.meshes) :]
             if any(a[1] != b[1] or not np.array_equal(a[0], b[0]) for a, b in zip(first, last, strict=True)):
                 continue
-            why = self._difference(answer, first, last)
+            why = self._difference(result, first, last)
             if why is None:
                 return None
         return why
 
-    def _difference(self, answer, first, last):
-        if answer.accuracy not in ("fast", "balanced", "conservative", "exact"):
+    def _difference(self, result, first, last):
+        if result.accuracy not in ("fast", "balanced", "conservative", "exact"):
             return "no such accuracy"
         scene = hc.Scene()
         for mesh, (faces, n_vertices, _) in zip(self.meshes, last, strict=True):
@@ -157,19 +157,19 @@ class Oracle:
         for pair, named in kinds.items():
             scene.set_features(*pair, named)
         report = self.given.get("report", "all")
-        if list(answer.mesh_names) != self.meshes:
+        if list(result.mesh_names) != self.meshes:
             return "other meshes"
-        separated = [np.asarray(getattr(answer, f"separation{part}")).tolist() for part in ("_mesh_a", "_mesh_b", "s")]
+        separated = [np.asarray(getattr(result, f"separation{part}")).tolist() for part in ("_mesh_a", "_mesh_b", "s")]
         if len({len(part) for part in separated}) > 1:
             return "no such separation"
         try:
             detector = hc.Detector(
                 scene,
-                accuracy=answer.accuracy,
+                accuracy=result.accuracy,
                 backend="cpu",
                 report="all" if report == "any" else report,
-                minimum_separation=answer.minimum_separation,
-                features={1: "vertex_face", 2: "edge_edge"}.get(answer.tested_features, ("vertex_face", "edge_edge")),
+                minimum_separation=result.minimum_separation,
+                features={1: "vertex_face", 2: "edge_edge"}.get(result.tested_features, ("vertex_face", "edge_edge")),
             )
             for a, b, distance in zip(*separated, strict=True):
                 detector.set_separation(a, b, distance)
@@ -183,20 +183,20 @@ class Oracle:
         except ValueError:
             return NOT_THERE
         rows = self._rows(found, last)
-        told = list(zip(*(_columns(answer, name) for name in FIELDS), strict=True))
+        told = list(zip(*(_columns(result, name) for name in FIELDS), strict=True))
         if report == "any":
             if bool(told) != bool(rows) or not set(told) <= set(rows):
                 return "no such contact"
             return None
-        if answer.truncated != (len(told) < len(rows)):
+        if result.truncated != (len(told) < len(rows)):
             return "truncated or not"
         times = sorted(row[-1] for row in rows)
-        expected = rows if not answer.truncated else None
+        expected = rows if not result.truncated else None
         if expected is not None and told != expected:
             return "other contacts"
         if expected is None and (not set(told) <= set(rows) or sorted(r[-1] for r in told) != times[: len(told)]):
             return "other contacts"
-        if (answer.total, answer.first_toc, answer.hash) != (len(rows), found.first_toc, found.hash):
+        if (result.total, result.first_toc, result.hash) != (len(rows), found.first_toc, found.hash):
             return "another total, first time or hash"
         return None
 
@@ -215,8 +215,8 @@ class Oracle:
         return rows
 
 
-def _columns(answer, name):
-    values = np.asarray(getattr(answer, name)).tolist()
+def _columns(result, name):
+    values = np.asarray(getattr(result, name)).tolist()
     return list(zip(values[::2], values[1::2], strict=True)) if name.startswith("features") else values
 
 

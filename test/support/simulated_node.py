@@ -12,7 +12,7 @@ from hpccd_ros.bag.reader import Recording
 from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.detect.step_detector import Detection, StepDetector
 from hpccd_ros.frames.taken_inputs import TakenInputs
-from hpccd_ros.middleware import answer_fields, contact_messages, fields, snapshot_messages
+from hpccd_ros.middleware import contact_messages, fields, result_fields, snapshot_messages
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.frames import FrameSource
 
@@ -38,7 +38,7 @@ def run(
     early: bool = False,
 ) -> list[Recorded]:
     """The content of a recording of the node. heard: topic and message, in the order of the recorder. taken: indices
-    into ``heard`` in the order of the node, or events. early: the recorder receives answers before their last
+    into ``heard`` in the order of the node, or events. early: the recorder receives results before their last
     inputs."""
     found = [
         Recorded(topic, message, BEGAN + BETWEEN * k + 7, BEGAN + BETWEEN * k)
@@ -48,7 +48,7 @@ def run(
     with Recording(path) as recording:
         setup = recorded_setup.of_recording(recording)
         by_time = {message.publish_time: message for message in recording.messages()}
-        source, inputs, answers = FrameSource(setup, recording.topics, ordered=True), TakenInputs(), []
+        source, inputs, results = FrameSource(setup, recording.topics, ordered=True), TakenInputs(), []
         options = dataclasses.replace(setup.options("", "cpu", 1), distances=parameters.get("distances", False))
         detector = StepDetector(setup.builder, options)
         source.restart(all_known=False)
@@ -70,29 +70,29 @@ def run(
                 frame = frame.after_inputs(inputs.count)
                 if last is not None and last.same_scene(frame) and frame.stamp > last.stamp:
                     at = found[latest].log_time + (-3 if early else 3)
-                    sent = found[latest].sent + 1000 + len(answers)
-                    answers += _answers(detector.detect(last, frame), inputs, at, sent)
+                    sent = found[latest].sent + 1000 + len(results)
+                    results += _results(detector.detect(last, frame), inputs, at, sent)
                 last = frame
-    return found + answers
+    return found + results
 
 
-def _answers(found: Detection, inputs: TakenInputs, at: int, sent: int) -> list[Recorded]:
+def _results(found: Detection, inputs: TakenInputs, at: int, sent: int) -> list[Recorded]:
     message = ContactArray(step=found.end.step, accuracy=found.options.accuracy, backend=found.backend)
     message.header.stamp, message.header.frame_id = fields.ns_to_stamp(found.end.stamp), found.end.frame_id
     message.start = fields.ns_to_stamp(found.start.stamp)
     contact_messages.fill_contacts(message, found.contacts, found.layout, max_contacts=0, outputs=())
-    answer_fields.fill_separation(message, found.options.separation)
-    answer_fields.fill_features(message, found.options.features)
-    answer_fields.fill_bounds(message, found.bounds)
+    result_fields.fill_separation(message, found.options.separation)
+    result_fields.fill_features(message, found.options.features)
+    result_fields.fill_bounds(message, found.bounds)
     end = found.end.inputs
-    answer_fields.fill_inputs(message, inputs.pop_until(end), start=found.start.inputs, end=end)
-    answer_fields.fill_report(message, found.options.report)
-    answers = [Recorded("contacts", message, at, sent)]
+    result_fields.fill_inputs(message, inputs.pop_until(end), start=found.start.inputs, end=end)
+    result_fields.fill_report(message, found.options.report)
+    results = [Recorded("contacts", message, at, sent)]
     if found.gaps is not None:
         beside = DistanceArray(header=message.header, step=found.end.step, accuracy=found.options.accuracy)
         snapshot_messages.fill_distances(beside, found.gaps, found.layout)
-        answers.append(Recorded("distances", beside, at + 1, sent + 1))
-    return answers
+        results.append(Recorded("distances", beside, at + 1, sent + 1))
+    return results
 
 
 def write(path: Path, parameters: dict, messages: list[Recorded]) -> Path:

@@ -57,7 +57,7 @@ class StopStream:
             self.node.peer.vertices(name, positions, stamp=self.sent, **fields)
 
     def answered(self, count=None):
-        self.node.frames_status(answered=2 * (count or self.sent))
+        self.node.frames_status(processed=2 * (count or self.sent))
 
     def start(self, heights=(2.0, 1.0)):
         """From the topologies to a stop that is false."""

@@ -3,7 +3,7 @@
 
 setup       what is simulated: numbers only
 springs     the cloth's own forces: extended position-based dynamics on a grid
-queries     the questions to a collision detector, and the class that answers them in this process
+queries     the queries to a collision detector, and the class that computes them in this process
 pairs       close pairs of features as half spaces
 response    how these pairs push and rub the cloth
 ledger      momentum, energy, and what changed them

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the solver asks of a collision detector, and the detector of this process that answers it."""
+"""The queries of the solver, and the collision detector of this process that computes them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Near(Protocol):
 class Queries:
     """The three questions. Positions are (V,3) float32, the cloth's vertices first, then the ball's.
 
-    seconds: spent in answers so far, ways to and fro included.
+    seconds: spent in queries so far, with transport.
     """
 
     def __init__(self) -> None:

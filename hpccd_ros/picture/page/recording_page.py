@@ -127,12 +127,12 @@ class RecordingPage:
             yield "Nothing is drawn: the recording holds no positions of all meshes at the end of this step."
         if step.difference:
             self._differ += 1
-            yield f"The recorded answer was another one: {step.difference}."
+            yield f"The recorded result was another one: {step.difference}."
         recorded = step.recorded
         if recorded is not None and recorded.truncated:
             self._truncated += 1
             yield (
-                f"The recorded answer held only the {len(recorded.kind):,} earliest of {recorded.total:,} contacts "
+                f"The recorded result held only the {len(recorded.kind):,} earliest of {recorded.total:,} contacts "
                 "(max_contacts)."
             )
         if step.total > drawn:
@@ -179,28 +179,28 @@ class RecordingPage:
 
     def _with_gap(self, step, gaps):
         missing = gaps[step["place"]]
-        notices = [f"{_count(missing, 'step')} right before this one: no answer {GAP}."] if missing else []
+        notices = [f"{_count(missing, 'step')} right before this one: no result {GAP}."] if missing else []
         return {**step, "gap": missing, "notices": step["notices"] + notices}
 
     def _notes(self, left_out):
         replay = self._replay
         notes = []
-        if not replay.recorded_answers:
-            notes.append("The recording holds no answers of a node: contacts were computed from its frames.")
+        if not replay.recorded_results:
+            notes.append("The recording holds no results of a node: contacts were computed from its frames.")
         if self._every > 1:
             notes.append(f"Each {_ordinal(self._every)} step of the recording is shown (--every {self._every}).")
         for count, what in (
             (self._missing, "could not be computed: their contacts are not shown"),
             (self._differ, "were recorded with other contacts than those computed again, which are shown"),
-            (self._truncated, "had their recorded answer truncated (max_contacts); all contacts were computed again"),
+            (self._truncated, "had their recorded result truncated (max_contacts); all contacts were computed again"),
             (self._cut, f"have more than {MOST:,} contacts; only these are drawn"),
         ):
             if count:
                 notes.append(f"{count:,} of {_count(len(self._steps), 'step')} {what}.")
         if left_out:
-            notes.append(f"{_count(left_out, 'step')} between the first and the last one: no answer {GAP}.")
+            notes.append(f"{_count(left_out, 'step')} between the first and the last one: no result {GAP}.")
         if self._dropped:
-            notes.append(f"The node had dropped {_count(self._dropped, 'frame')} when it gave the last answer.")
+            notes.append(f"The node had dropped {_count(self._dropped, 'frame')} when it gave the last result.")
         return notes
 
 
@@ -252,7 +252,7 @@ def _page_of(args, source, title, view, every) -> RecordingPage:
         visual = VisualGeometry(setup.visual())
         view |= {"visual": visual, "intersecting": IntersectingFaces(setup.builder)}
         page = RecordingPage(replay, setup.mesh_names, title, every=every, **view)
-        for number, step in enumerate(track(replay.steps(), "steps", True, replay.recorded_answers or None)):
+        for number, step in enumerate(track(replay.steps(), "steps", True, replay.recorded_results or None)):
             page.add(step, step.step == args.step if args.step is not None else number % every == 0)
         if not page.steps:
             raise UserError(f"{source}: no step{'' if args.step is None else f' {args.step}'} that can be shown")

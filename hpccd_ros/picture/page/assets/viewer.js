@@ -287,7 +287,7 @@ class Viewer {
     byId("notes").replaceChildren(...[
       ...notes,
       "Contacts are those of the recorded frames, computed again when this page was written; milliseconds are those of that "
-      + "computation, for a recording holds none. Where the recorded answer was another one, the step says so.",
+      + "computation, for a recording holds none. Where the recorded result was another one, the step says so.",
       `Positions are rounded to steps in the unit of length of the scene, so they may be off by half a step along each axis. `
       + `${rounded}; points of contacts: ${short(contacts.step)}. Times of contact are rounded to 1/${contacts.times}.`,
       `Drawn with three.js r${library.revision}, as ${library.source} carries it. This file needs no network, and asks for none.`,

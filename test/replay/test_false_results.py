@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Answers that are not what the node would have sent diverge, however they are disguised."""
+"""Results that are not what the node would have sent diverge, however they are disguised."""
 
 import functools
 import json
@@ -16,12 +16,12 @@ import hpccd_core as hc
 from hpccd_core.options import REPORTS
 from hpccd_ros.picture import view
 
-ANSWER = 3
+RESULT = 3
 
 
 @pytest.fixture
-def answered(sound_bags, tmp_path):
-    """Replays a copy with one answer changed by `change(put, answer)`, put(field, value); options for the node."""
+def with_change(sound_bags, tmp_path):
+    """Replays a copy with one result changed by `change(put, result)`, put(field, value); options for the node."""
 
     def replay(change, **parameters):
         bag = Bag.read(sound_bags / "streams.mcap")
@@ -30,8 +30,8 @@ def answered(sound_bags, tmp_path):
         bag.metadata[0].metadata["json"] = json.dumps(info)
         if "report" in parameters:
             number = 1 + REPORTS.index(parameters["report"])
-            decoded(bag, "/contacts", _First(), lambda put, answer: put("report", number), all_of_them=True)
-        target = bag.of_topic("/contacts")[ANSWER]
+            decoded(bag, "/contacts", _First(), lambda put, result: put("report", number), all_of_them=True)
+        target = bag.of_topic("/contacts")[RESULT]
         others, bag.messages = bag.messages, [target]
         decoded(bag, "/contacts", _First(), change)
         bag.messages = others
@@ -49,7 +49,7 @@ class _First:
 
 
 def _diverges(done, says):
-    assert done.status == 1 and "DIVERGED: 1 of 7 answers differ" in done.out and says in done.out, done.out
+    assert done.status == 1 and "DIVERGED: 1 of 7 results differ" in done.out and says in done.out, done.out
 
 
 def _vertices(sound_bags):
@@ -58,72 +58,72 @@ def _vertices(sound_bags):
     return typestore().deserialize_cdr(data, name).n_vertices
 
 
-def test_the_same_number_in_the_scene_under_another_mesh(answered, sound_bags):
+def test_the_same_number_in_the_scene_under_another_mesh(with_change, sound_bags):
     shift = _vertices(sound_bags)
 
-    def change(put, answer):
-        mesh, features = answer.mesh_a.copy(), answer.features_a.copy()
+    def change(put, result):
+        mesh, features = result.mesh_a.copy(), result.features_a.copy()
         sign = 1 if mesh[0] == 1 else -1
         mesh[0] = 1 - mesh[0]
         features[0] = np.uint32((int(features[0]) + sign * shift) % 2**32)
         put("mesh_a", mesh)
         put("features_a", features)
 
-    _diverges(answered(change), "malformed: features_a of contact 0 are ")
+    _diverges(with_change(change), "malformed: features_a of contact 0 are ")
 
 
-def test_an_entry_that_is_not_used(answered):
-    def change(put, answer):
-        features = answer.features_b.copy()
+def test_an_entry_that_is_not_used(with_change):
+    def change(put, result):
+        features = result.features_b.copy()
         features[1] = 5
         put("features_b", features)
 
-    _diverges(answered(change), "malformed: features_b of contact 0 are ")
+    _diverges(with_change(change), "malformed: features_b of contact 0 are ")
 
 
 @pytest.mark.parametrize("name", ["points", "normals"])
-def test_points_of_another_number(answered, name):
-    _diverges(answered(lambda put, answer: put(name, np.zeros(4))), f"malformed: {name} has 4 coordinates for")
+def test_points_of_another_number(with_change, name):
+    _diverges(with_change(lambda put, result: put(name, np.zeros(4))), f"malformed: {name} has 4 coordinates for")
 
 
-def test_marked_as_cut_off_though_it_is_whole(answered):
-    _diverges(answered(lambda put, answer: put("truncated", True)), "contacts are marked as truncated")
+def test_marked_as_cut_off_though_it_is_whole(with_change):
+    _diverges(with_change(lambda put, result: put("truncated", True)), "contacts are marked as truncated")
 
 
-def test_a_time_that_is_no_number(answered):
-    def change(put, answer):
-        put("toc", np.where(np.arange(len(answer.toc)) == 0, math.nan, answer.toc))
+def test_a_time_that_is_no_number(with_change):
+    def change(put, result):
+        put("toc", np.where(np.arange(len(result.toc)) == 0, math.nan, result.toc))
 
-    _diverges(answered(change), "recorded at t = nan")
+    _diverges(with_change(change), "recorded at t = nan")
 
 
 @pytest.mark.parametrize("accuracy", ["", "exakt", "a" * 100_000])
-def test_found_with_an_accuracy_that_there_is_not(answered, accuracy):
-    _diverges(answered(lambda put, answer: put("accuracy", accuracy)), "malformed: its accuracy is ")
+def test_found_with_an_accuracy_that_there_is_not(with_change, accuracy):
+    _diverges(with_change(lambda put, result: put("accuracy", accuracy)), "malformed: its accuracy is ")
 
 
 def _only(rows):
-    """A change that keeps these contacts of the answer."""
+    """A change that keeps these contacts of the result."""
 
-    def change(put, answer):
+    def change(put, result):
         for name, size in {"kind": 1, "mesh_a": 1, "mesh_b": 1, "features_a": 2, "features_b": 2, "toc": 1}.items():
-            put(name, getattr(answer, name).reshape(-1, size)[rows].reshape(-1))
+            put(name, getattr(result, name).reshape(-1, size)[rows].reshape(-1))
         for name in ("points", "normals"):
-            put(name, getattr(answer, name)[:0])
-        put("total", len(answer.kind))
-        put("first_toc", float(min(answer.toc, default=math.inf)))
+            put(name, getattr(result, name)[:0])
+        put("total", len(result.kind))
+        put("first_toc", float(min(result.toc, default=math.inf)))
 
     return change
 
 
-def test_any_contact_is_verified_where_any_was_asked_for(answered):
-    done = answered(_only([5]), report="any")
+def test_any_contact_is_verified_where_any_was_asked_for(with_change):
+    done = with_change(_only([5]), report="any")
     assert done.status == 0, done
-    assert "VERIFIED: 7 answers hold a contact where there is one, and one that there is" in done.out
+    assert "VERIFIED: 7 results hold a contact where there is one, and one that there is" in done.out
 
 
 def test_the_core_finds_the_same_time_of_any_contact():
-    """Or the comparison above would call the node's own answers wrong."""
+    """Or the comparison above would call the node's own results wrong."""
     generator = np.random.default_rng(5)
     faces = np.arange(120).reshape(-1, 3)
     scene = hc.Scene()
@@ -148,21 +148,21 @@ def test_the_core_finds_the_same_time_of_any_contact():
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (lambda put, answer: put("toc", answer.toc[::-1].copy()), "now at t = "),
+        (lambda put, result: put("toc", result.toc[::-1].copy()), "now at t = "),
         (
-            lambda put, answer: put(
-                "features_b", np.where(np.arange(len(answer.features_b)) == 0, 0, answer.features_b)
+            lambda put, result: put(
+                "features_b", np.where(np.arange(len(result.features_b)) == 0, 0, result.features_b)
             ),
             "now not found",
         ),
-        (lambda put, answer: put("total", 1), "1 contacts in total"),
-        (lambda put, answer: put("first_toc", 0.5), "first time of contact"),
+        (lambda put, result: put("total", 1), "1 contacts in total"),
+        (lambda put, result: put("first_toc", 0.5), "first time of contact"),
         (_only([]), "0 contacts were recorded"),
-        (lambda put, answer: put("kind", answer.kind[:-1]), "malformed"),
+        (lambda put, result: put("kind", result.kind[:-1]), "malformed"),
     ],
 )
-def test_any_contact_must_be_one_that_there_is(answered, change, says):
-    _diverges(answered(change, report="any"), says)
+def test_any_contact_must_be_one_that_there_is(with_change, change, says):
+    _diverges(with_change(change, report="any"), says)
 
 
 def test_coordinates_that_the_core_rejects(sound_bags, tmp_path):

@@ -18,12 +18,12 @@ else:
         return _TypeVar(name)
 
 
-OfMotion = TypeVar("OfMotion", default=Contacts)
-OfProximity = TypeVar("OfProximity", default=Proximity)
-OfIntersections = TypeVar("OfIntersections", default=Intersections)
+MotionResult = TypeVar("MotionResult", default=Contacts)
+ProximityResult = TypeVar("ProximityResult", default=Proximity)
+IntersectionsResult = TypeVar("IntersectionsResult", default=Intersections)
 # list[list[Gap]] and an array where there are worlds.
-OfDistances = TypeVar("OfDistances", default=list[Gap])
-OfStep = TypeVar("OfStep", default=float)
+DistancesResult = TypeVar("DistancesResult", default=list[Gap])
+StepResult = TypeVar("StepResult", default=float)
 
 
 class Options(TypedDict, total=False):

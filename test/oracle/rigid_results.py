@@ -19,7 +19,7 @@ _TOC_ERROR = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Answers:
+class Results:
     """(Q,) each. ``hit``, ``toc``: what was found; ``bound``: B_a + B_b + rho; ``parts``: of the step."""
 
     hit: np.ndarray
@@ -30,7 +30,7 @@ class Answers:
     seconds: float
 
 
-def ask(queries: Queries) -> Answers:
+def ask(queries: Queries) -> Results:
     test = hc.test_vertex_face if queries.pairs.kind == "vf" else hc.test_edge_edge
     n = len(queries.distance)
     hit, toc = np.zeros(n, bool), np.full(n, np.inf)
@@ -47,7 +47,7 @@ def ask(queries: Queries) -> Answers:
         if hits.any():
             first = int(hits.argmax())
             hit[k], toc[k] = True, (first + tocs[first]) / cut.parts
-    return Answers(hit, toc, bounds, deviations, parts, time.perf_counter() - began)
+    return Results(hit, toc, bounds, deviations, parts, time.perf_counter() - began)
 
 
 @dataclass(frozen=True)
@@ -77,22 +77,22 @@ class Verdict:
         return not (self.missed or self.late or self.beyond or self.open)
 
 
-def judge(queries: Queries, answers: Answers) -> Verdict:
+def judge(queries: Queries, results: Results) -> Verdict:
     """A contact at distance 0 cannot be proven by distances, nor need it be: what is proven is that nothing touches."""
     pairs, d = queries.pairs, queries.distance
-    free, found = np.flatnonzero(~answers.hit), np.flatnonzero(answers.hit)
-    asked = np.flatnonzero(~answers.hit | (d > 0))
+    free, found = np.flatnonzero(~results.hit), np.flatnonzero(results.hit)
+    asked = np.flatnonzero(~results.hit | (d > 0))
     truth = np.full(len(d), OPEN)
     truth[asked] = comes_within(pairs, d[asked], rows=asked)
-    limit = d[found] + 2 * answers.bound[found]
+    limit = d[found] + 2 * results.bound[found]
     # As near as it says, when it says so: but for what the time may be off.
-    apart = pairs.near(found, answers.toc[found])[0]
-    speed = _speed(pairs, found, answers.toc[found])
+    apart = pairs.near(found, results.toc[found])[0]
+    speed = _speed(pairs, found, results.toc[found])
     late_by = _TOC_ERROR * speed + 64 * np.finfo(float).eps * pairs.size()[found]
-    timed = np.flatnonzero(answers.hit & (d > 0) & (answers.toc > _TOC_ERROR))
-    before = comes_within(pairs, d[timed], until=answers.toc[timed] - _TOC_ERROR, rows=timed)
-    excess = (apart - d[found]) / np.maximum(answers.bound[found], 1e-300)
-    measurable = answers.bound[found] > 1e3 * late_by
+    timed = np.flatnonzero(results.hit & (d > 0) & (results.toc > _TOC_ERROR))
+    before = comes_within(pairs, d[timed], until=results.toc[timed] - _TOC_ERROR, rows=timed)
+    excess = (apart - d[found]) / np.maximum(results.bound[found], 1e-300)
+    measurable = results.bound[found] > 1e3 * late_by
     return Verdict(
         queries=len(d),
         touching=int((truth == WITHIN).sum()),
