@@ -41,7 +41,7 @@ class Sides:
 
     @classmethod
     def zeros(cls, n: int) -> Sides:
-        """Room for n pairs."""
+        """Arrays for n pairs."""
         zeros = np.zeros
         return cls(zeros(n, np.uint32), zeros(n, np.uint32), zeros((n, 2), np.uint32), zeros((n, 2), np.uint32))
 

@@ -21,7 +21,7 @@ class PreparedDetection:
     Attributes
     ----------
     vf, ee : DeviceArray, shapes (n, 2) and (m, 4), uint32
-        As in :class:`DeviceContacts`, with all the room there is; rows beyond `counts` are of earlier detections.
+        As in :class:`DeviceContacts`, at full capacity; rows beyond `counts` are of earlier detections.
     toc : DeviceArray, float64
         Times of impact of the vertex-face rows, then of the edge-edge rows.
     counts : DeviceArray, shape (3,), int64

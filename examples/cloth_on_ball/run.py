@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A square cloth falls on a spinning ball, and never touches it or itself.
 
-A simulator with three queries to hpccd: pairs that come near during a step (constraints of the solver), the
+A simulator with three queries to hpccd: pairs within the separation during a step (constraints of the solver), the
 collision-free part of a solved move (the step size), and, as a check, intersections. The physics is in the package
 cloth_solver beside this file; docs/simulators.md explains it.
 

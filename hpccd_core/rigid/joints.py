@@ -41,7 +41,7 @@ As with screws the points of edges and faces deviate no more than vertices do. T
 each length above is off by the relative error of `rounding.at_chain`, for which eight times that stands.
 
 The core computes what is derived here (hpccd_core/src/rigid/joint_bounds.cpp); test/rigid/joints_oracle.py is the same
-in Python, to the last bit.
+in Python, bit-identical.
 """
 
 import math

@@ -108,7 +108,7 @@ class Screw:
         return middle + _cross(self.axis, way) * (math.cos(self.half) / (2.0 * math.sin(self.half)))
 
     def pose(self, t: float) -> Rigid:
-        """At the fraction t in [0, 1]; the ends are those given, bit for bit."""
+        """At the fraction t in [0, 1]; the ends are bit-identical to those given."""
         if t <= 0.0:
             return self.start
         if t >= 1.0:

@@ -3,7 +3,7 @@
 
 Sums are written out and sines are those of the C library: matrix products and numpy's own sines have other last bits on
 other processors, and a recording must be computed again to the same contacts anywhere. The core does the same for the
-joints of robots, to the last bit: hpccd_core/src/rigid/pose.h.
+joints of robots, bit-identical: hpccd_core/src/rigid/pose.h.
 """
 
 import math

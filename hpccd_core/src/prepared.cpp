@@ -39,8 +39,8 @@ DeviceResults PreparedDetection::contacts() const {
   gpu::download(p.counts, &c, sizeof c);
   if (c.state != PreparedCounts::complete)
     throw std::runtime_error("the last detection is not complete" + why_incomplete(c.state) +
-                             ". detect() answers any motion; where room is all that lacks, prepare() with that motion, "
-                             "or with more room");
+                             "; detect() handles any motion; if only room is lacking, prepare() with that motion or "
+                             "with more room");
   DeviceResults r;
   r.memory = p.memory, r.device = p.device;
   r.n_vf = c.vertex_face, r.n_ee = c.edge_edge;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What callers get wrong is refused, by name, and changes nothing.
+// Invalid arguments are rejected by name and change nothing.
 #include <gtest/gtest.h>
 
 #include <cmath>

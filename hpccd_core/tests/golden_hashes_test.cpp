@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Results are the same bits on every processor. Each constant below is the hash of all that a question is answered with
-// on x86-64, for every instruction set and number of threads. One that changes means that results have changed: that is
-// said in CHANGELOG.rst, and of what nobody meant to change it is a bug. A failure prints the hash that was found; to
-// regenerate the constants, put the printed ones in their place.
+// Results are bit-identical on every processor. Each constant below is the hash of the whole result of a query on
+// x86-64, for every instruction set and number of threads. A changed constant means that results have changed:
+// CHANGELOG.rst must report it, and an unintended change is a bug. A failure prints the hash that was found; to
+// regenerate the constants, replace them with the printed ones.
 //
 // Coordinates come of whole numbers, by operations that IEEE 754 rounds in one way only: no sine, none of the standard
 // library's distributions.

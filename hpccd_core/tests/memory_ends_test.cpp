@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Wherever memory ends: std::bad_alloc comes out, and the next call answers as if nothing had been.
+// Wherever memory ends: std::bad_alloc is thrown, and the next call works as if nothing had happened.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -196,7 +196,7 @@ TEST(MemoryEnds, InACallOfManyWorlds) {
   EXPECT_GT(n, some);
 }
 
-// Whose thread takes pairs from all and has no room for them: it leaves, and nobody waits for it.
+// A thread takes pairs from all others and has no memory for them: it leaves, and no thread waits for it.
 TEST(MemoryEnds, WherePairsAreShared) {
   paper::SharedPairs shared;
   paper::PairQueue given(10000, {0, 1});

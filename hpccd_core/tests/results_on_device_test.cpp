@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options::results_on_device: without a GPU a detector refuses it at once; with one, no query reads on the host what is
+// Options::results_on_device: without a GPU a detector rejects it at once; with one, no query reads on the host what is
 // on the device.
 #include <gtest/gtest.h>
 
@@ -40,7 +40,7 @@ TEST(ResultsOnDevice, AreNotAskedForOnTheHost) {
   if (gpu::status().devices.empty()) GTEST_SKIP() << gpu::status().reason;
   const auto start = test::sheet_positions(side, 0), end = test::sheet_positions(side, 1);
   const Positions a = test::view(start), b = test::view(end);
-  // Where the device computes, and where the CPU does and its answer is brought there.
+  // Where the device computes, and where the CPU does and its result is copied there.
   for (const Backend backend : {Backend::gpu, Backend::cpu}) {
     Detector detector(test::two_sheets(side), {.backend = backend, .results_on_device = true});
     const std::pair<const char*, std::function<void()>> asked[] = {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What users and strangers sent, quoted in messages: short enough to be read, whatever its length."""
+"""Untrusted input quoted in messages, shortened to a readable length."""
 
 import difflib
 from collections import Counter

@@ -18,8 +18,8 @@ class Monitor:
     """Listens to `contacts` and to the diagnostics of the node.
 
     results: steps that the node has processed so far. step, contacts, first_toc: of the last one received. most:
-    largest number of contacts and its step. dropped: frames dropped by the node. core_ms: median of the core's time for a
-    frame, None until the node has reported it. first_received, last_received: when the first and the last result was
+    largest number of contacts and its step. dropped: frames dropped by the node. core_ms: median of the core's time for
+    a frame, None until the node has reported it. first_received, last_received: when the first and the last result was
     received (monotonic, s).
     """
 

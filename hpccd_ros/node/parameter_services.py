@@ -25,7 +25,7 @@ _WORDS = {
 
 
 def replace_callbacks(node: Node) -> None:
-    """Values of a type that does not exist are rejected with a reason; rclpy 7.1 raises, and the client gets no response.
+    """Values of a type that does not exist are rejected with a reason; rclpy 7.1 raises without a response.
     Integers become floats where the parameter is one: `ros2 param set` takes a number without a point for an integer.
     """
     for service in node.services:

@@ -20,7 +20,7 @@ class IntersectingFaces:
         self._detector: hc.Detector | None = None
 
     def of(self, topologies: tuple[Topology, ...], vertices: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """(F,) bool for each mesh: a face that an edge of another mesh pierces, or whose edge pierces another mesh."""
+        """(F,) bool for each mesh: a face that an edge of another mesh intersects, or whose edge intersects another mesh."""
         if self._detector is None or topologies != self._topologies:
             self._topologies, self._detector = topologies, hc.Detector(self._builder.build(topologies))
         found = self._detector.intersections(np.concatenate([np.asarray(v, np.float64) for v in vertices])).ef
@@ -28,9 +28,9 @@ class IntersectingFaces:
         faces = np.concatenate([t.faces.astype(np.int64) + first for t, first in zip(topologies, firsts, strict=False)])
         marked = np.zeros(len(faces), bool)
         marked[found[:, 2]] = True
-        piercing = np.unique(_keys(found[:, :2], firsts[-1]))
+        crossing = np.unique(_keys(found[:, :2], firsts[-1]))
         for a, b in ((0, 1), (1, 2), (2, 0)):
-            marked |= np.isin(_keys(faces[:, [a, b]], firsts[-1]), piercing)
+            marked |= np.isin(_keys(faces[:, [a, b]], firsts[-1]), crossing)
         return np.split(marked, np.cumsum([len(topology.faces) for topology in topologies])[:-1])
 
 

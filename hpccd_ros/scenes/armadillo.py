@@ -91,7 +91,7 @@ def _posed(vertices, belongs, roots, amount: float):
 
 
 def _squeezed(points):
-    """Points of the posed body -> between the rollers, whose axes are at z = 0: none farther in x than there is room.
+    """Points of the posed body -> between the rollers, whose axes are at z = 0: none farther in x than the gap allows.
 
     The map is continuous and turns nothing over. Skin that was far outside comes to lie against the roller; what is
     lost in x is gained in y and z.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A robot in a scene: what it is, its joints over time, and where its links are, to the bit.
+"""A robot in a scene: its description, its joint positions over time, and the exact poses of its links.
 
 Sines of the C library differ in their last bits from machine to machine, and with them the arm's joint values and the
 corners of its round links. So both are rounded here, to steps far larger than these differences: only a value within

@@ -14,7 +14,7 @@ from cloth_solver.setup import Setup
 
 
 class Near(Protocol):
-    """Pairs that come near: as hpccd_core.Contacts names them, with normals and closest points at their toc."""
+    """Pairs within the separation: as hpccd_core.Contacts names them, with normals and closest points at their toc."""
 
     vf: np.ndarray
     vf_toc: np.ndarray
@@ -42,7 +42,7 @@ class Queries:
         raise NotImplementedError
 
     def intersections(self, positions: np.ndarray) -> int:
-        """Edges that pierce or touch a face."""
+        """Edges that intersect or touch a face."""
         raise NotImplementedError
 
     def made(self, positions: np.ndarray) -> None:

@@ -17,7 +17,7 @@
 
 namespace hpccd {
 
-// Thread 0 distributes the jobs. On other systems than Linux, and if the system refuses, nothing is done.
+// Thread 0 distributes the jobs. On systems other than Linux, and if the call fails, nothing is done.
 class ThreadAffinity {
  public:
   explicit ThreadAffinity(int threads) : places_(static_cast<std::size_t>(threads)) {}

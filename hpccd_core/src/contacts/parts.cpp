@@ -59,7 +59,7 @@ void check_rows(const ContactsOfPart& of) {
   const auto all_or_none = [n](const auto& places) { return places.empty() || places.size() == n; };
   if (of.vf.size() != of.vf_toc.size() || of.ee.size() != of.ee_toc.size() || !all_or_none(of.points) ||
       !all_or_none(of.normals) || !all_or_none(of.closest))
-    throw InvalidArgument("answers: contacts of unequal lengths; give them as a detector returned them");
+    throw InvalidArgument("results: contacts of unequal lengths; give them as a detector returned them");
 }
 
 double time_in_step(const ContactsOfPart& of, double toc) { return (of.part + toc) / of.parts; }

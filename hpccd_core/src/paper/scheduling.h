@@ -45,7 +45,7 @@ class Scheduling {
   struct alignas(64) Slot {
     std::atomic<std::uint32_t> front_triangles{0};
     std::atomic<std::uint32_t> n_requests{0};
-    std::atomic<bool> open{false};  // has work and answers requests; changed under the mutex
+    std::atomic<bool> open{false};  // has work and serves requests; changed under the mutex
     std::mutex mutex;               // of the scheduling queue
     std::vector<int> requests;      // the scheduling queue: the requesting threads, each once; has room for all
     std::mutex message_mutex;

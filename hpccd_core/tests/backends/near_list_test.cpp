@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// When a list of near pairs answers, and when the next is worth its price.
+// When a list of near pairs suffices for a query, and when the next list pays off.
 #include "backends/near_list.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Many worlds by a backend of one: a device that answers, fails, or refuses.
+// Many worlds by a backend of one: a device that succeeds, fails, or rejects the input.
 #include "backends/one_by_one.h"
 
 #include <gtest/gtest.h>

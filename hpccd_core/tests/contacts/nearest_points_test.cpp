@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nearest points of two features: as near as the features are, on both of them, at the time asked for.
+// Nearest points of two features: on both features, as far apart as the features, at the requested time.
 #include "contacts/nearest_points.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The answers about the parts of a step against a map from pairs to what was said of them first.
+// The merged results of the parts of a step against a map from each pair to its first result.
 #include "contacts/parts.h"
 
 #include <gtest/gtest.h>

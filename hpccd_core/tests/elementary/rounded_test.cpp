@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests that begin in single precision, from rounded coordinates: never a contact less, or at another time, than in
-// double precision alone, and of the tier that ends there few wrong answers, the same with every instruction set.
+// double precision alone, and of the tier that ends there few wrong results, the same with every instruction set.
 // The backend decides with which of the two a step begins, so tiers that promise equal results must not depend on it.
 #include <gtest/gtest.h>
 

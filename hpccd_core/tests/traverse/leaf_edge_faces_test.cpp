@@ -26,7 +26,7 @@ struct LeafEdgeFacesTest : testing::Test {
   MotionBounds motion;
   Tree tree;
 
-  // The sheets cross halfway, crumpled: in flat ones no edge comes near a face of its own leaf.
+  // The sheets cross halfway, crumpled: in flat ones no edge is close to a face of its own leaf.
   LeafEdgeFacesTest() {
     auto positions = test::sheet_positions(side, 0.5, lone);
     std::mt19937 random(7);

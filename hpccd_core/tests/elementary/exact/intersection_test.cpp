@@ -132,7 +132,7 @@ TEST(ExactIntersection, OnALatticeIsThatOfTheLinearProgram) {
 }
 
 // Two limbs and integers of any size, and numbers that would under- or overflow: powers of two along each axis, which
-// change no answer. A first corner far away keeps the range of bits wide.
+// change no result. A first corner far away keeps the range of bits wide.
 TEST(ExactIntersection, DoesNotDependOnTheScaleOfAnAxis) {
   std::mt19937_64 random(6);
   Counts counts;

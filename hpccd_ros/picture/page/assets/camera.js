@@ -73,7 +73,7 @@ class OrbitCamera {
     return { tall, wide: tall * this.three.aspect };
   }
 
-  // As near as all that reaches so far stays in view: it must lie between the side planes.
+  // The closest distance from which everything within that reach stays in view: it must lie between the side planes.
   frame(most) {
     if (most.front === -Infinity) return;
     const { right, up, backward } = this.axes(), { tall, wide } = this.slopes();
