@@ -17,7 +17,7 @@ def is_binary(data: bytes) -> bool:
 
 
 def fits(data: bytes) -> bool:
-    """Whether it is large enough for its number of triangles. In a text file that number would be hundreds of millions."""
+    """Whether it is large enough for its number of triangles. In a text file that number is hundreds of millions."""
     return len(data) >= _HEADER and 0 < _count(data) <= (len(data) - _HEADER) // _TRIANGLE.itemsize
 
 

@@ -397,7 +397,7 @@ PYBIND11_MODULE(_core, m) {
         for (const auto& [contacts, part, parts] : answers) of_parts.push_back(part_of(contacts, part, parts, kept));
         return to_dict(unlocked([&] { return contacts_of_step(of_parts); }));
       },
-      "results"_a);
+      "answers"_a);
   m.def(
       "hash_of_contacts",
       [](const py::object& contacts) {

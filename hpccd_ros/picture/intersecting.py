@@ -20,7 +20,7 @@ class IntersectingFaces:
         self._detector: hc.Detector | None = None
 
     def of(self, topologies: tuple[Topology, ...], vertices: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """(F,) bool for each mesh: a face that an edge of another mesh intersects, or whose edge intersects another mesh."""
+        """(F,) bool for each mesh: faces that an edge of another mesh intersects, or whose edge intersects one."""
         if self._detector is None or topologies != self._topologies:
             self._topologies, self._detector = topologies, hc.Detector(self._builder.build(topologies))
         found = self._detector.intersections(np.concatenate([np.asarray(v, np.float64) for v in vertices])).ef
