@@ -138,11 +138,11 @@ class StopListener:
                 return f"{self._topic} is true"
             several = max(self._publishers, self._alive or 0) > 1
             if several and 1e-9 * (system - self._sent_true) < self._timeout:
-                return f"{self._topic} is true from one of several publishers"
+                return f"{self._topic}: one of several publishers said true in the last {self._timeout:g} s"
             return None
 
     def _too_few(self, alive: int) -> str:
-        return f"{self._topic}: {alive} of {counted(self._publishers, 'publisher')} alive"
+        return f"{self._topic}: {counted(alive, 'publisher')} alive, {self._publishers} expected"
 
     def _on_message(self, message: Bool, info: dict[str, Any]) -> None:
         sent = info["source_timestamp"]  # 0, and so too old, if the middleware provides none

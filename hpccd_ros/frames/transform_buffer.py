@@ -48,16 +48,16 @@ class _Edge(Samples[Rigid]):
         if not self.stamps:
             raise NoTransformError(f"none from {child!r} to {self.parent!r} since the clock was set back", final=False)
         if at == len(self.stamps):
-            late = f"the last one from {child!r} to {self.parent!r} is of {self.stamps[-1]} ns"
+            late = f"the last one from {child!r} to {self.parent!r} is from {self.stamps[-1]} ns"
             raise NoTransformError(f"{late}, before the stamp {stamp} ns", final=False)
         if self.stamps[at] == stamp:
             return self.samples[at], OUTDATED if self.outdated else self.sent[at]
         if self.in_doubt(stamp):
-            ahead = f"the last one from {child!r} to {self.parent!r} is of {self.stamps[-1]} ns"
-            text = f"{ahead}, far ahead of the stamp {stamp} ns and of all before; the next one decides if it is valid"
-            raise NoTransformError(text, final=False)
+            ahead = f"the last one from {child!r} to {self.parent!r} is from {self.stamps[-1]} ns"
+            text = f"{ahead}, far ahead of the stamp {stamp} ns and all earlier ones"
+            raise NoTransformError(f"{text}; the next one decides whether it is valid", final=False)
         if at == 0:
-            early = f"the first one kept from {child!r} to {self.parent!r} is of {self.stamps[0]} ns"
+            early = f"the oldest stored one from {child!r} to {self.parent!r} is from {self.stamps[0]} ns"
             raise NoTransformError(f"{early}, after the stamp {stamp} ns", final=True)
         before, after = self.stamps[at - 1], self.stamps[at]
         rigid = self.samples[at - 1].between(self.samples[at], (stamp - before) / (after - before))

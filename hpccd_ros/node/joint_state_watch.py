@@ -5,6 +5,7 @@ outside the limits of a description, which are often in another unit. No ROS."""
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 from hpccd_ros.base.quoting import counted, listed, shortened, suggestion
 from hpccd_ros.node.silence import Silence
@@ -15,6 +16,11 @@ _LEAST = 3
 # Of the width of a joint's limits, by which a position is outside before it is reported: a calibrated encoder reads a
 # little beyond its stop.
 _BEYOND = 0.01
+# Of that width, by which it is outside before its unit is doubted: a little beyond the limits, each angle would be
+# valid as one in degrees.
+_FAR = 0.5
+# s for which a joint stays reported: a gripper in millimetres is within limits in metres whenever it is closed.
+_STAYS = 5.0
 # Joints outside their limits that are reported at a time.
 _MOST = 3
 
@@ -29,37 +35,39 @@ class JointStateWatch:
         self._advanced = _Useful(clock)
         self._named = _Useful(clock)
         self._silence = Silence(clock)
+        self._clock = clock
         self._names: Sequence[str] = ()
-        self._joints: Mapping[str, RobotJoint] = {}
-        self._allowed: dict[str, tuple[float, float]] = {}
-        self._outside: dict[str, float] = {}  # joint -> its last position
+        self._joints: set[str] = set()
+        self._limits: dict[str, list[_Limits]] = {}  # by joint; robots may share names
+        self._outside: dict[str, _Outside] = {}
 
     def use(self, robots: Iterable[Mapping[str, RobotJoint]]) -> None:
         """robots: name -> joint, of each robot that this topic moves and that is known."""
-        self._joints = {name: joint for joints in robots for name, joint in joints.items()}
-        self._allowed, self._outside = {}, {}
-        for name, joint in self._joints.items():
-            low, high = joint.limits or (0.0, 0.0)
-            if low < high:  # <limit effort="1" velocity="1"/> has both at 0
-                margin = _BEYOND * (high - low)
-                self._allowed[name] = low - margin, high + margin
+        self._joints, self._limits, self._outside = set(), {}, {}
+        for joints in robots:
+            self._joints.update(joints)
+            for name, joint in joints.items():
+                low, high = joint.limits or (0.0, 0.0)
+                if low < high:  # <limit effort="1" velocity="1"/> has both at 0
+                    self._limits.setdefault(name, []).append(_Limits(low, high, joint.turns))
 
     def receive(self, stamp: int, names: Sequence[str], positions: Sequence[float] = ()) -> None:
         self._received += 1
         if stamp > self._stamp or stamp < self._stamp - 10**9:  # a clock that is set back advances from there
             self._advanced.at(self._received)
             self._stamp = stamp
-        if not self._joints or not self._joints.keys().isdisjoint(names):
+        if not self._joints or not self._joints.isdisjoint(names):
             self._named.at(self._received)
         else:
             self._names = names
         for name, position in zip(names, positions, strict=False):
-            if (allowed := self._allowed.get(name)) is None:
-                continue
-            if position < allowed[0] or position > allowed[1]:
-                self._outside[name] = position
-            elif self._outside:
-                self._outside.pop(name, None)
+            for limits in self._limits.get(name, ()):
+                if math.isfinite(position) and limits.beyond(position) > _BEYOND:
+                    self._outside[name] = _Outside(position, limits, self._clock())
+                    break
+            else:
+                if name in self._outside and self._clock() - self._outside[name].at >= _STAYS:
+                    del self._outside[name]
 
     def silent(self, publishers: int) -> bool:
         """Whether no message has come for a while from this number of publishers."""
@@ -82,23 +90,41 @@ class JointStateWatch:
                 f"{self._topic}: no message names a joint of the robot ({listed(joints)}); the last one names "
                 f"{listed(map(shortened, names)) or 'none'}; use the names of its description{near}"
             )
-        outside = list(self._outside.items())
-        lines += [self._beyond_limits(name, position) for name, position in outside[:_MOST]]
-        if (more := len(outside) - _MOST) > 0:
+        lines += [
+            f"{self._topic}: joint {shortened(name)} {outside}" for name, outside in [*self._outside.items()][:_MOST]
+        ]
+        if (more := len(self._outside) - _MOST) > 0:
             lines.append(f"{self._topic}: {counted(more, 'more joint')} outside the limits of the description")
         return lines
 
-    def _beyond_limits(self, name: str, position: float) -> str:
-        joint = self._joints[name]
-        (low, high), (least, most) = joint.limits or (0.0, 0.0), self._allowed[name]
-        unit, other, factor = ("rad", "degrees", math.pi / 180) if joint.turns else ("m", "millimetres", 1e-3)
-        remedy = "send another position, or correct the limits"
-        if least <= position * factor <= most:
-            remedy = f"positions are in {unit}, and this one may be in {other}"
-        return (
-            f"{self._topic}: joint {shortened(name)} is at {position:g} {unit}, outside its limits {low:g} .. {high:g} "
-            f"in the description; {remedy}"
+
+class _Limits(NamedTuple):
+    """Of a joint; ``turns``: in radians, not metres."""
+
+    low: float
+    high: float
+    turns: bool
+
+    def beyond(self, position: float) -> float:
+        """How far it is outside, as a fraction of the width."""
+        return max(self.low - position, position - self.high) / (self.high - self.low)
+
+
+class _Outside(NamedTuple):
+    """The last ``position`` of a joint outside its ``limits``, and when it was received."""
+
+    position: float
+    limits: _Limits
+    at: float
+
+    def __str__(self) -> str:
+        low, high, turns = self.limits
+        unit, name, other, factor = (
+            ("rad", "radians", "degrees", math.pi / 180) if turns else ("m", "metres", "millimetres", 1e-3)
         )
+        far = self.limits.beyond(self.position) > _FAR and self.limits.beyond(self.position * factor) <= _BEYOND
+        remedy = f"send {name} (this looks like {other})" if far else "correct the position or the limits"
+        return f"is at {self.position:g} {unit}, outside its limits {low:g} .. {high:g} in the description; {remedy}"
 
 
 class _Useful:

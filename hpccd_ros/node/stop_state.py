@@ -254,8 +254,8 @@ class StopState:
         if self._oldest == UNKNOWN_TIME:
             text = f"the middleware does not provide source timestamps for messages of mesh {self._oldest_of}"
             return Why(Cause.SILENT, text)
-        since = "a later frame is being processed" if self._busy() else "no later frame was clear"
-        text = f"the last clear frame rests on a message of mesh {self._oldest_of} sent {1e-9 * age:.3g} s ago; {since}"
+        since = "a later frame is being processed" if self._busy() else "no later frame has a result"
+        text = f"mesh {self._oldest_of}: the last result is based on a message sent {1e-9 * age:.3g} s ago; {since}"
         return Why(Cause.SILENT, text)
 
     def _doubt_all(self, cause: Cause, text: str) -> None:

@@ -81,8 +81,10 @@ class StopSignal:
         if cause == self._logged or now < self._log_after or not self._node.context.ok():
             return
         self._log_after, self._logged = now + LOG_PERIOD, cause
-        logger = self._node.get_logger()
-        (logger.info if cause in _EXPECTED else logger.warning)(text)
+        if cause in _EXPECTED:  # rclpy refuses another severity from the same line
+            self._node.get_logger().info(text)
+        else:
+            self._node.get_logger().warning(text)
 
 
 _WARNED = {Cause.NEAR: DiagnosticStatus.WARN, Cause.UNANSWERED: DiagnosticStatus.WARN}
@@ -140,7 +142,7 @@ class StopWatch:
         except Cancelled:
             raise
         except Exception as error:
-            self._state.failed(f"the step that ends at {end.stamp} ns could not be looked at: {error}")
+            self._state.failed(f"the distances of the step that ends at {end.stamp} ns were not computed: {error}")
             if not isinstance(error, CORE_ERRORS):
                 self._node.errors.caught("stop", error)
             return

@@ -10,7 +10,7 @@ LASTS = 2.0
 # s without a cause, after which it is logged again if it comes back.
 GONE = 10.0
 # Stamps and counts, by which two texts of one cause differ, as they do by the remedy; numbers within names stay.
-_NUMBER = re.compile(r"(?<![\w/])-?\d[\d.,]*(?!\w)")
+_NUMBER = re.compile(r"(?<![\w/])-?\d[\d.,]*(e[+-]\d+)?(?!\w)")
 
 
 class WarningLog:

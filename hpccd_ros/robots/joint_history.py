@@ -33,8 +33,8 @@ def check_lengths(names: Sequence[str], positions: Sequence[float]) -> None:
     """Raises RobotError if the message is malformed. A joint state without positions has only velocities or efforts."""
     if len(positions) not in (0, len(names)):
         raise RobotError(
-            f"joint states: {counted(len(names), 'name')} and {counted(len(positions), 'position')}; each joint needs "
-            "one of both"
+            f"joint states: {counted(len(names), 'name')} and {counted(len(positions), 'position')}; give one "
+            "position for each name"
         )
     if len(set(names)) < len(names):
         twice = next(name for at, name in enumerate(names) if name in names[:at])
@@ -120,18 +120,21 @@ class JointHistory:
         if early:
             first = max(self._joints[name].stamps[0] for name in early)
             raise NoJointStateError(
-                f"the first position kept of {listed(early)} is of {first} ns, after the stamp {stamp} ns", final=True
+                f"the oldest stored position of {listed(early)} is from {first} ns, after the stamp {stamp} ns",
+                final=True,
             )
         late = [name for name, values in self._joints.items() if stamp > values.stamps[-1]]
         if late:
             last = min(self._joints[name].stamps[-1] for name in late)
-            text = f"the last position of {listed(late)} is of {last} ns, before the stamp {stamp} ns"
+            text = f"the last position of {listed(late)} is from {last} ns, before the stamp {stamp} ns"
             text = text if last else f"{text}; its publisher must set header.stamp"
             raise NoJointStateError("; ".join([text, *self._reasons(late)]), final=False)
         if doubtful := [name for name, values in self._joints.items() if values.in_doubt(stamp)]:
             last = self._joints[doubtful[0]].stamps[-1]
-            text = f"the last position of {listed(doubtful)} is of {last} ns, far ahead of the stamp {stamp} ns"
-            raise NoJointStateError(f"{text} and of all before; the next one decides if it is valid", final=False)
+            text = f"the last position of {listed(doubtful)} is from {last} ns, far ahead of the stamp {stamp} ns"
+            raise NoJointStateError(
+                f"{text} and all earlier ones; the next one decides whether it is valid", final=False
+            )
         return {name: values.at(stamp) for name, values in self._joints.items()}
 
     def sent_at(self, stamp: int) -> int:
@@ -152,10 +155,10 @@ class JointHistory:
         known = [name for name in lacking if name in self._last and name not in self._unusable]
         if known:
             last = max(self._last[name] for name in known)
-            reasons.append(f"the last position of {listed(known)}, of {last} ns, is from before the clock was set back")
+            reasons.append(f"the last position of {listed(known)}, at {last} ns, is from before the clock was set back")
         if never := [name for name in lacking if name not in self._last and name not in self._unusable]:
             named = f"; the last one names {listed(self._named)}" if self._named else ""
-            reasons.append(f"no joint state has contained {listed(never)}{named}")
+            reasons.append(f"no joint state so far names {listed(never)}{named}")
         raise NoJointStateError("; ".join(reasons), final=False)
 
     def _reasons(self, names: Sequence[str]) -> list[str]:

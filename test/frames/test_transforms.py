@@ -104,7 +104,7 @@ def test_what_strangers_send_is_bounded(monkeypatch):
         buffer.add("world", "x" * 256, turn(0), None)
     for k in range(3 * samples.MOST_SAMPLES):
         buffer.add("world", "hand", turn(0), 100 * SECOND + k)
-    with pytest.raises(NoTransformError, match="the first one kept"):
+    with pytest.raises(NoTransformError, match="the oldest stored one"):
         buffer.lookup("hand", "world", 100 * SECOND + 2 * samples.MOST_SAMPLES - 1)
     buffer.lookup("hand", "world", 100 * SECOND + 2 * samples.MOST_SAMPLES)
 

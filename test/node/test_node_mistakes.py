@@ -357,8 +357,8 @@ IN_STREAM = {
     "joint-states-in-degrees": Mistake(
         BY_JOINTS,
         {"joint_states": (JointState, RELIABLE, [joints("shoulder", k * 10**8, 45.0) for k in range(1, 1000)])},
-        "NS/joint_states: joint shoulder is at 45 rad, outside its limits -1 .. 1 in the description; positions are in "
-        "rad, and this one may be in degrees",
+        "NS/joint_states: joint shoulder is at 45 rad, outside its limits -1 .. 1 in the description; send "
+        "radians (this looks like degrees)",
     ),
     "joint-states-of-another-robot": Mistake(
         BY_JOINTS,

@@ -206,7 +206,7 @@ def test_frames_wait_for_joint_states_and_take_what_lies_between_two(start_node)
     cloth(node, 10)
     values = node.frames_status(waiting=4)
     node.wait_until(
-        lambda: "crane waits: no joint state has contained turn, reach" in node.peer.statuses["frames"][1],
+        lambda: "crane waits: no joint state so far names turn, reach" in node.peer.statuses["frames"][1],
         "a word of it",
     )
     half = crane.joint_state(0, 5)
@@ -226,7 +226,9 @@ def test_frames_wait_for_joint_states_and_take_what_lies_between_two(start_node)
     joints.publish(not_finite)
     node.frames_status(joint_states_rejected=2)
     cloth(node, 20)  # waits for `reach`; `turn` of that message is known
-    awaited = "the last position of reach is of 15 ns, before the stamp 20 ns; 'reach' is nan in the joint state of 20"
+    awaited = (
+        "the last position of reach is from 15 ns, before the stamp 20 ns; 'reach' is nan in the joint state of 20"
+    )
     node.wait_until(lambda: awaited in node.peer.statuses["frames"][1], "joint and message")
     assert values["restarts"] == "0" and node.process.poll() is None
 
@@ -437,8 +439,8 @@ def test_joint_states_that_cannot_be_used_are_told_of_before_the_robot_is_known(
     joints.publish(short)
     values = node.frames_status(joint_states_rejected=1)
     assert (
-        values["last_rejection"] == "joint_states: malformed: joint states: 2 names and 1 position; each joint "
-        "needs one of both"
+        values["last_rejection"] == "joint_states: malformed: joint states: 2 names and 1 position; give one "
+        "position for each name"
     )
     joints.publish(JointState(name=[f"j{k}" for k in range(1001)], position=[0.0] * 1001))
     values = node.frames_status(joint_states_rejected=2)
@@ -611,7 +613,7 @@ def test_a_robot_alone_says_what_it_waits_for(start_node, by):
     else:
         joints = node.peer.publisher(JointState, "joint_states")
         joints.publish(JointState(name=["turn"], position=[0.0]))
-        awaited = "no frame yet: crane: no joint state has contained reach; the last one names turn"
+        awaited = "no frame yet: crane: no joint state so far names reach; the last one names turn"
     node.wait_until(lambda: awaited in node.peer.statuses["frames"][1], "a word of it")
     for k in (1, 2):
         for message in [crane.joint_state(k, k)] if by == "joints" else transforms(k, "left_"):

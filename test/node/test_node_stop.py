@@ -316,6 +316,8 @@ def test_a_robot_of_which_something_newer_is_rejected_is_unknown(start_stream):
 
     describe.publish(String(data=SLIDER))
     clear()
+    until(stop_is(True, "true: table and arm/tip came within 0.25 of each other"), at=(-1.95,))
+    clear()
     until(stop_is(True, "joint states on joint_states rejected: malformed"), names="zz", at=(-1.95, 0.0))
     clear()
     for _ in range(20):
@@ -363,7 +365,7 @@ def test_dead_input_is_true(start_stream):
     stream.expect(True)
     rose = next(at for at, said in reversed(stream.heard) if at > died and said)
     assert rose - died < SHORT + 5.0
-    stream.status("silent", "the last clear frame rests on a message of mesh")
+    stream.status("silent", "the last result is based on a message sent")
 
 
 def test_frames_that_waited_while_the_node_was_held_up_are_old(start_stream):
@@ -414,7 +416,25 @@ def test_the_life_cycle_makes_it_true(start_stream):
     assert change_state(stream.node, Transition.TRANSITION_DEACTIVATE)
     assert change_state(stream.node, Transition.TRANSITION_CLEANUP)
     stream.expect(True)
-    stream.node.wait_until(lambda: "0 of 1 publisher alive" in stream.listener.reason, "no publisher")
+    stream.node.wait_until(lambda: "0 publishers alive, 1 expected" in stream.listener.reason, "no publisher")
+
+
+def test_faults_are_warnings_in_the_log_and_other_changes_are_not(start_stream):
+    stream = start_stream(timeout=SHORT)
+
+    def logged(level, text):
+        def is_logged():
+            return any(f"[{level}]" in line and text in line for line in stream.node.output().splitlines())
+
+        stream.node.wait_until(is_logged, text)
+
+    with stream.steady():
+        stream.topologies()
+        logged("INFO", "stop is false")
+    logged("WARN", "the last result is based on a message sent")
+    with stream.steady(height=0.1):
+        logged("INFO", "stop: hand and table came within 0.25")
+    assert "stop: the node is not active" not in stream.node.output(), "each node begins so"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

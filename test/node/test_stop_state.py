@@ -103,7 +103,10 @@ def test_the_oldest_message_of_a_step_tells_its_age(state, old):
     assert cause(state) is None
     state.times.pass_by(0.6)
     assert cause(state) is Cause.SILENT
-    assert f"mesh {'arm/tip' if old == 'tip' else 'hand'} sent 9.6 s ago" in state.why().text
+    assert (
+        f"mesh {'arm/tip' if old == 'tip' else 'hand'}: the last result is based on a message sent 9.6 s ago"
+        in state.why().text
+    )
 
 
 def test_what_has_no_age_and_what_tells_none(state):

@@ -60,6 +60,11 @@ def test_a_cause_comes_back_as_a_new_episode(log):
     assert log(11) == [] and log(3, ["x"]) == ["x"]
 
 
+def test_numbers_with_exponents_make_no_new_cause(log):
+    said = [line for k in range(9) for line in log(1, [f"joint elbow is at {1234567.0 + 10 * k:g} rad"])]
+    assert said == ["joint elbow is at 1.23459e+06 rad"]
+
+
 def test_numbers_make_no_new_cause_but_names_do(log):
     assert log(3, ["stamp 12 ns, 1,000 more, -1.5"]) == ["stamp 12 ns, 1,000 more, -1.5"]
     assert log(5, ["stamp 13 ns, 7 more, 2.5"]) == []
@@ -152,19 +157,24 @@ def test_before_a_robot_is_known_no_name_is_wrong(clock):
     assert watch.warnings() == []
 
 
+DEGREES, MILLIMETRES = "send radians (this looks like degrees)", "send metres (this looks like millimetres)"
+NEITHER = "correct the position or the limits"
+
+
 @pytest.mark.parametrize(
     "kind, limits, position, remedy",
     [
-        ("revolute", (-2.0, 2.0), 45.0, "positions are in rad, and this one may be in degrees"),
-        ("revolute", (-2.0, 2.0), -2.05, "positions are in rad, and this one may be in degrees"),
-        ("prismatic", (0.0, 0.3), 120.0, "positions are in m, and this one may be in millimetres"),
-        ("prismatic", (1.0, 1.3), 0.5, "send another position, or correct the limits"),
-        ("revolute", (-2.0, 2.0), 400.0, "send another position, or correct the limits"),
-        ("revolute", (-2.0, 2.0), math.inf, "send another position, or correct the limits"),
+        ("revolute", (-2.0, 2.0), 45.0, DEGREES),
+        ("revolute", (-2.0, 2.0), -5.0, DEGREES),
+        ("revolute", (-2.0, 2.0), -2.05, NEITHER),  # -2.05 degrees would be valid, too
+        ("revolute", (-2.0, 2.0), 400.0, NEITHER),
+        ("prismatic", (0.0, 0.3), 120.0, MILLIMETRES),
+        ("prismatic", (1.0, 1.3), 0.5, NEITHER),
         ("revolute", (-2.0, 2.0), 2.03, None),
         ("revolute", (0.0, 0.0), 45.0, None),
         ("continuous", None, 45.0, None),
-        ("revolute", (-2.0, 2.0), math.nan, None),  # rejected elsewhere
+        ("revolute", (-2.0, 2.0), math.inf, None),  # rejected elsewhere, as nan
+        ("revolute", (-2.0, 2.0), math.nan, None),
     ],
 )
 def test_positions_outside_the_limits(clock, kind, limits, position, remedy):
@@ -174,15 +184,39 @@ def test_positions_outside_the_limits(clock, kind, limits, position, remedy):
     if remedy is None:
         assert watch.warnings() == []
         return
-    unit = "rad" if kind == "revolute" else "m"
+    unit = "m" if kind == "prismatic" else "rad"
     assert watch.warnings() == [
         f"/joint_states: joint elbow is at {position:g} {unit}, outside its limits {limits[0]:g} .. {limits[1]:g} in "
         f"the description; {remedy}"
     ]
     watch.receive(2, ["gripper"], [99.0])
     assert len(watch.warnings()) == 1
-    watch.receive(3, ["elbow"], [limits[0]])
+    clock.now += 60.0
+    watch.receive(3, ["elbow"], [math.nan])
+    watch.receive(4, ["elbow"], [limits[0]])
     assert watch.warnings() == []
+
+
+def test_a_position_that_is_outside_now_and_then_is_logged_once(log, watch, clock):
+    """A gripper in millimetres that opens and closes: closed it is within limits in metres."""
+    watch.use([{"finger": joint("finger", "prismatic", (0.0, 0.04))}])
+    logged = []
+    for k in range(60):
+        watch.receive(k, ["finger"], [40.0 - k % 3 if k % 2 else 0.0])
+        logged += log(1, watch.warnings())
+    assert len(logged) == 1 and logged[0].endswith(MILLIMETRES)
+    for k in range(60, 66):
+        watch.receive(k, ["finger"], [0.0])
+        clock.now += 1.0
+    assert watch.warnings() == []
+
+
+def test_two_robots_whose_joints_share_a_name(clock):
+    watch = JointStateWatch("/joint_states", clock)
+    watch.use([{"elbow": joint("elbow", limits=limits)} for limits in ((-1.0, 1.0), (-3.0, 3.0))])
+    watch.receive(1, ["elbow"], [1.5])
+    (line,) = watch.warnings()
+    assert "outside its limits -1 .. 1 in" in line
 
 
 def test_many_positions_outside_the_limits(watch):

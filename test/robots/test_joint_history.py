@@ -44,13 +44,13 @@ def test_order_of_arrival_does_not_matter_and_the_same_stamp_replaces():
 
 def test_what_is_not_known_is_named_and_whether_it_may_come():
     joints = history()
-    with pytest.raises(NoJointStateError, match="no joint state has contained turn, slide$"):
+    with pytest.raises(NoJointStateError, match="no joint state so far names turn, slide$"):
         joints.latest()
     joints.add(100, ["slide"], [1.0])
     for stamp, message, final in [
-        (100, "no joint state has contained turn; the last one names slide", False),
+        (100, "no joint state so far names turn; the last one names slide", False),
         (50, "after the stamp 50 ns", True),
-        (250, "the last position of turn, slide is of 200 ns, before the stamp 250 ns", False),
+        (250, "the last position of turn, slide is from 200 ns, before the stamp 250 ns", False),
     ]:
         if stamp == 50:
             joints.add(200, ["turn", "slide"], [0.0, 0.0])
@@ -62,7 +62,7 @@ def test_what_is_not_known_is_named_and_whether_it_may_come():
 def test_a_publisher_that_gives_no_stamps_is_told_of():
     joints = history()
     joints.add(0, ["turn", "slide"], [0.0, 0.0])
-    with pytest.raises(NoJointStateError, match="is of 0 ns, before .* 5 ns; its publisher must set header"):
+    with pytest.raises(NoJointStateError, match="is from 0 ns, before .* 5 ns; its publisher must set header"):
         joints.at(5)
 
 
@@ -83,7 +83,7 @@ def test_a_position_that_is_not_finite_leaves_the_others_of_its_message_in_use()
     assert joints.add(200, ["slide", "turn"], [2.0, 2.0]) == Added()
     assert joints.add(300, ["slide", "turn"], [-math.inf, 3.0]).unusable
     assert joints.latest() == 200 and joints.at(200) == {"turn": 2.0, "slide": 2.0}
-    with pytest.raises(NoJointStateError, match="is of 200 ns, before .* 300 ns; 'slide' is -inf in .* of 300 ns$"):
+    with pytest.raises(NoJointStateError, match="is from 200 ns, before .* 300 ns; 'slide' is -inf in .* of 300 ns$"):
         joints.at(300)
     joints.add(400, ["slide"], [4.0])
     assert joints.at(300) == {"turn": 3.0, "slide": 3.0}
@@ -104,7 +104,7 @@ def test_a_joint_that_was_named_before_a_restart_is_not_called_unnamed():
     joints.add(100, ["turn", "slide"], [0.0, 0.0])
     joints.clear()
     joints.add(10, ["turn"], [0.0])
-    expected = "^the last position of slide, of 100 ns, is from before the clock was set back$"
+    expected = "^the last position of slide, at 100 ns, is from before the clock was set back$"
     with pytest.raises(NoJointStateError, match=expected):
         joints.latest()
 
@@ -137,7 +137,7 @@ def test_what_is_kept_is_bounded():
     joints = history()
     for k in range(3 * MOST_SAMPLES):
         joints.add(k, ["slide", "turn"], [k, 0.0])
-    with pytest.raises(NoJointStateError, match=f"of {2 * MOST_SAMPLES} ns") as rejected:
+    with pytest.raises(NoJointStateError, match=f"from {2 * MOST_SAMPLES} ns") as rejected:
         joints.at(0)
     assert rejected.value.final
     for stamp in (2 * HISTORY_NS, 2 * HISTORY_NS + 1):
@@ -199,7 +199,7 @@ def test_a_stamp_far_ahead_loses_nothing_of_what_comes_before_and_after():
     assert joints.add(FAR, ["slide", "turn"], [9.0, 9.0]).stray is None
     assert joints.at(FAR) == {"slide": 9.0, "turn": 9.0}
     assert of_now(joints, 485) is False
-    with pytest.raises(NoJointStateError, match=f"is of {FAR} ns, far ahead of the stamp 495000000 ns") as rejected:
+    with pytest.raises(NoJointStateError, match=f"is from {FAR} ns, far ahead of the stamp 495000000 ns") as rejected:
         joints.at(495 * MS)
     assert not rejected.value.final
     assert joints.add(500 * MS, ["turn"], [0.0]).stray == FAR  # of all joints that it told of
