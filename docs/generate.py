@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the site has beside its pages: ROS interfaces, commands, and the C++ headers in the comments of its reader."""
+"""Generated pages of the site: ROS interfaces, commands, and the C++ headers with comments for their parser."""
 
 import contextlib
 import io
@@ -69,7 +69,7 @@ def _paragraphs(comment: list[str]) -> list[str]:
 
 
 def commands() -> str:
-    """What `--help` prints of each command."""
+    """The page with the `--help` of each command."""
     os.environ["COLUMNS"] = "100"
     lines = ["# Commands", "", "Generated from `--help`.", ""]
     for name in ["", *cli.COMMANDS]:

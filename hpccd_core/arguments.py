@@ -248,7 +248,7 @@ def output_names(value: Iterable[str]) -> tuple[str, ...]:
 
 
 def feature_names(value: Iterable[str]) -> tuple[str, ...]:
-    """What is to be tested, from one name or both: in the order of FEATURES, each once."""
+    """The features to test, from one name or both: in the order of FEATURES, each once."""
     names = _names("features", value, FEATURES)
     if not names:
         raise ValueError(
@@ -486,7 +486,7 @@ def _at(value: Any, where: Iterable[int]) -> Any:
 
 
 def _kind(value: object, array: NDArray[Any]) -> str:
-    """What was given, in a few words."""
+    """The given value in a few words."""
     if array.ndim == 0 and not isinstance(value, (np.ndarray, np.generic)):
         return type(value).__name__
     return f"dtype {array.dtype}"

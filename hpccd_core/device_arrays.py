@@ -13,7 +13,7 @@ from . import _core
 
 
 class CudaArray(Protocol):
-    """What PyTorch, CuPy, Numba and Warp give out under this name."""
+    """An array of PyTorch, CuPy, Numba or Warp with this attribute."""
 
     @property
     def __cuda_array_interface__(self) -> dict[str, Any]: ...

@@ -20,7 +20,7 @@ class GpuDevice(TypedDict):
 
 
 class GpuStatus(TypedDict):
-    """What a build and machine can do with GPUs.
+    """GPU support of a build and machine.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ def backends() -> list[str]:
 
 
 def gpu_status() -> GpuStatus:
-    """What this build and machine can do with GPUs, and why a GPU is not usable.
+    """Return the GPU support of this build and machine, and why a GPU is not usable.
 
     Returns
     -------

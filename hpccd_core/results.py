@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What results share: outputs that a detector computes only if asked, and the meshes of each pair."""
+"""Common parts of results: outputs that a detector computes on request only, and the meshes of each pair."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class WithSides:
 
 
 def with_outputs(found: dict[str, Any], outputs: tuple[str, ...]) -> dict[str, Any]:
-    """What the core returns, with the outputs that were asked for in a dict of their own."""
+    """The result of the core, with the requested outputs in a dict of their own."""
     # A loop, not comprehensions, which cost 1.3 us of a call of 15.
     kept = {}
     for name in OUTPUTS:

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the example tells at its end: intersections, momentum, energy, time; and whether they are plausible."""
+"""The report at the end of the example: intersections, momentum, energy, time; and whether they are plausible."""
 
 import numpy as np
 
 # Positions are rounded to float32 in each frame; lengths are of the order of 1 m.
 ROUNDING = 2e-7
-# Of the momentum that came in: sums of some 10,000 doubles, some 10,000 times.
+# Tolerance, as a share of the momentum received: sums of some 10,000 doubles, some 10,000 times.
 SUMMED = 1e-9
-# Of the angular momentum that came in, or, where the ball gives next to none, that the cloth had at most: springs pull
-# along where they are in the middle of a small step, so that each step leaves a little of it.
+# Tolerance, as a share of the angular momentum received, or of the largest that the cloth had if the ball gives almost
+# none: springs pull along their direction in the middle of a small step, so each step has a small error.
 TURNED = 0.05
 
 

@@ -25,7 +25,7 @@ from hpccd_ros.scenes import files
 PATIENCE = 60.0
 # QoS of every response.
 ACCURACY = "exact"
-# What the node computes beside the contacts, and that it sends all of them.
+# Outputs that the solver needs besides the contacts; no limit on their number.
 PARAMETERS = {"outputs": ["normals", "closest"], "max_contacts": 0}
 
 

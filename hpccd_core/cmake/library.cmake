@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # The library: compiled once, put together as an archive and as a shared library.
-# Of the cold part the sources of a folder are compiled together: headers cost them more than their own code. Not of the
-# hot part, which loses speed so: published methods 9 to 16 percent.
+# The sources of a folder are compiled together in the cold part, where headers cost more than the code itself. The hot
+# part would lose speed: published methods 9 to 16 percent.
 set(hot ${hpccd_sources})
 list(FILTER hot INCLUDE REGEX "^src/(backends|bvh|paper|traverse)/")
 set(cold ${hpccd_sources})
@@ -17,7 +17,7 @@ foreach(part hpccd_core_hot hpccd_core_cold)
   target_include_directories(${part} PRIVATE include src)
   target_include_directories(${part} SYSTEM PRIVATE ${BOOST_INCLUDE})
   target_link_libraries(${part} PRIVATE Threads::Threads)
-  # Contraction of a*b+c would give different bits on machines with and without it. Nobody reads errno after sqrt.
+  # Contraction of a*b+c would give different bits on machines with and without it. No code reads errno after sqrt.
   target_compile_options(${part} PRIVATE -ffp-contract=off -Wall -Wextra -fno-math-errno)
   set_target_properties(${part} PROPERTIES
     CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON POSITION_INDEPENDENT_CODE ON)

@@ -25,7 +25,7 @@ of |D_i|
 it in half a step, sum over k > j of G_k |D_k| / 2, as x moves no faster than that relative to axis j.
 
 **The deviation.** For a curve over unit time and any unit vector e, e.x less its chord is 0 at both ends and has the
-second derivative e.x'': at most max |x''| / 8. Of one of n equal parts, max |x''| / (8 n**2). For max |x''| two bounds
+second derivative e.x'': at most max |x''| / 8. For one of n equal parts: max |x''| / (8 n**2). For max |x''| two bounds
 hold, and the less is taken: the sum above, that of the issue of joints that all turn alike; and |x''| in the middle of
 the step, plus max |x'''| / 2, which sees turns that cancel. In the middle, of a link within `girth` of its centre c,
 
@@ -161,12 +161,12 @@ class JointStep:
         return self._rows[t]
 
     def poses(self, t: float) -> list[Rigid]:
-        """Of each joint's link at the fraction t in [0, 1]."""
+        """Pose of each joint's link at the fraction t in [0, 1]."""
         return as_rigid(self.pose_rows(t))
 
     @cached_property
     def bounds(self) -> JointBounds:
-        """Of all links."""
+        """Bounds on the motion of all links."""
         return JointBounds(self.chain.core, self.start, self.end, self.base.quaternion, self.base.shift)
 
 

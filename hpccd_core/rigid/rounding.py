@@ -3,7 +3,7 @@
 
 The model: u = 2**-53; +, -, *, / and sqrt err by a relative u at most; sin, cos, atan2 of the C library by 4 u (two
 units in the last place; glibc and musl state one). Terms in u**2 are a 1e-14 th of those kept, and the constants below
-leave more room than that. What underflows is below `TINY`, which each bound contains. |.| is the Euclidean length; of
+leave more room than that. Underflow is below `TINY`, which each bound contains. |.| is the Euclidean length; of
 a matrix the spectral norm, at most the Frobenius norm.
 
 What a pose means: x = R v + p, with R the rotation of its quaternion brought to length one exactly, v the vertex as
@@ -110,5 +110,5 @@ def in_order(values: Iterable[float]) -> float:
 
 
 def dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Of two vectors of the same few numbers."""
+    """Dot product of two short vectors of equal length."""
     return in_order((a * b).tolist())

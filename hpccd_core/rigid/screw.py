@@ -29,7 +29,7 @@ is greatest at u = 0, and the deviation is at most
 
     r (1 - cos h) = (|c'| / 2) tan(h / 2),         |c'| = 2 r sin h,
 
-the sagitta. Of one of n equal parts it is r (1 - cos(h / n)) = |c'| sin(h / 2n)**2 / sin(h). This is proven up to h =
+the sagitta. For one of n equal parts it is r (1 - cos(h / n)) = |c'| sin(h / 2n)**2 / sin(h). This is proven up to h =
 pi, so the rounding of a half turn does no harm. A point of an edge or a face is an average of vertices with weights
 that do not change, on the true motion and on straight lines: its deviation is at most the greatest of theirs.
 

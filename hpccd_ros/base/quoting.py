@@ -5,9 +5,9 @@ import difflib
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-# Of one value: a path of usual length is shown whole.
+# Characters of one value: a path of usual length is shown whole.
 LONGEST = 200
-# Of a whole message, which may quote several.
+# Characters of a whole message, which may quote several values.
 LONGEST_MESSAGE = 1000
 # Names in a list.
 MOST = 10

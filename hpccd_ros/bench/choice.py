@@ -138,7 +138,7 @@ class Outcome:
 
 
 def outcomes(rows: Sequence[dict]) -> list[Outcome]:
-    """Of the rows of `hpccd bench accuracy` about whole scenes: one for each setting that every scene was tested with,
+    """From rows of `hpccd bench accuracy` about whole scenes: one for each setting that every scene was tested with,
     with the first of several instruction sets."""
     of: dict[Setting, dict[str, dict]] = {}
     for row in rows:
@@ -188,7 +188,7 @@ def choose(report, bounds: Sequence[Bound]) -> None:
     """Prints, and marks the rows of the chosen setting in the report, which fails where none keeps the bounds."""
     rows = report.rows
     found = outcomes(rows)
-    # What was asked for with the fewest true contacts in the scene that has most of them, and how many.
+    # The request with the fewest true contacts in the scene that has most of them, and their number.
     most: dict[str, float] = {}
     for row in rows:
         most[row["asked"]] = max(most.get(row["asked"], 0), row["true"])

@@ -165,7 +165,7 @@ def short(machine: dict) -> str:
 
 
 def _ticks() -> tuple[float, float, float]:
-    """Of all cores: all time, busy time, time of this process and its children."""
+    """Times summed over all cores: all time, busy time, time of this process and its children."""
     ticks = [int(word) for word in Path("/proc/stat").read_text().splitlines()[0].split()[1:9]]
     clock = os.times()
     own = clock.user + clock.system + clock.children_user + clock.children_system

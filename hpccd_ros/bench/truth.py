@@ -24,8 +24,8 @@ class Errors:
 
 
 def of_scene(found, truth: dict[str, np.ndarray], value: str = "toc", size: float = 1.0) -> Errors:
-    """found: hpccd_core.Contacts; truth: {"vf", "vf_toc", "ee", "ee_toc"} in any order. Of Proximity: value="distance",
-    and the size of the scene. Of Intersections: {"ef"}."""
+    """found: hpccd_core.Contacts; truth: {"vf", "vf_toc", "ee", "ee_toc"} in any order. Proximity: value="distance",
+    and the size of the scene. Intersections: {"ef"}."""
     missed = invented = 0
     off = [np.empty(0)]
     kinds = [kind for kind in ("vf", "ee", "ef") if kind in truth]

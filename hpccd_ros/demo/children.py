@@ -57,7 +57,7 @@ class Children:
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
-                # Of its own session: Ctrl-C reaches the parent alone, which ends the children in order.
+                # A session of its own: Ctrl-C reaches the parent alone, which ends the children in order.
                 start_new_session=True,
                 preexec_fn=_die_with_parent,
             )

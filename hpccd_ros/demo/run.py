@@ -156,7 +156,7 @@ def _steps(scene) -> int:
 
 
 def _slower(monitor, frames, rate) -> str:
-    """What to say where the scene has played slower than at `rate`."""
+    """A note if the scene was played slower than at `rate`."""
     took = monitor.last_received - monitor.first_received
     planned = (frames - 2) / rate  # from the first result to the last
     if took < 1.25 * planned + 1.0:

@@ -53,4 +53,4 @@ class Follower(Protocol):
         """Discard all samples."""
 
     def warnings(self) -> list[str]:
-        """What requested frames are waiting for."""
+        """Reasons for which requested frames wait."""

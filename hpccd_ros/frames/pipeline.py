@@ -146,7 +146,7 @@ class FramePipeline:
         return self._assembler.topology(mesh)
 
     def awaited_transform(self, mesh: str) -> list[str]:
-        """What frames of ``mesh`` are waiting for, in words; empty: none waits."""
+        """Reasons for which frames of ``mesh`` wait, in words; empty: none waits."""
         return self._transformers[mesh].warnings()
 
     def warnings(self) -> list[str]:

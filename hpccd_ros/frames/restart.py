@@ -74,7 +74,7 @@ class CoordinateFrame:
 
     @property
     def source(self) -> str:
-        """What determined the current frame; "" if there is none."""
+        """The source of the current frame; "" if there is none."""
         if self._demanded:
             return "parameter frame_id"
         return f"a message of mesh {self._set_by}" if self._set_by else ""

@@ -63,7 +63,7 @@ class MeshTransformer:
         return len(self._waiting)
 
     def warnings(self) -> list[str]:
-        """What frames are waiting for, if none has continued for a while."""
+        """Reasons for which frames wait, if none has continued for a while."""
         waits_long = self._waiting and self._standstill.long
         return [f"{self._mesh} waits for a transform: {self._missing(self._waiting[0])}"] if waits_long else []
 

@@ -32,7 +32,7 @@ class FeaturePairs:
         return cls(*(np.empty((0, width), np.uint32) if v is None else v for v, width in shapes))
 
     def keep(self, rows: NDArray[np.intp]) -> "FeaturePairs":
-        """Of all of them, in this order, only those with these numbers (ascending)."""
+        """The rows with these numbers (ascending), in this order."""
         first, second = len(self.vf), len(self.vf) + len(self.ee)
         of_vf, of_ee, of_ef = np.split(rows, np.searchsorted(rows, [first, second]))
         return FeaturePairs(self.vf[of_vf], self.ee[of_ee - first], self.ef[of_ef - second])

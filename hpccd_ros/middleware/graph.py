@@ -15,7 +15,7 @@ _GET_STATE = "lifecycle_msgs/srv/GetState"
 
 
 def full_name(name: str, namespace: str) -> str:
-    """Of a node."""
+    """Full name of a node."""
     return f"{namespace.rstrip('/')}/{name}"
 
 

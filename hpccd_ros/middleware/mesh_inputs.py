@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What comes on the topics of a mesh, by the last part of their names: messages -> checked topologies and frames."""
+"""Inputs of a mesh by the last part of their topic: messages -> checked topologies and frames."""
 
 from dataclasses import replace
 from typing import Any

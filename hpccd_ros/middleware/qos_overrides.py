@@ -45,7 +45,7 @@ def create_subscription(
 
 
 def reliability(node: Node, entity: str, topic: str, default: ReliabilityPolicy) -> ReliabilityPolicy:
-    """What the node asks or offers on ``topic`` (resolved name). entity: "publisher" or "subscription"."""
+    """The node's reliability on ``topic`` (resolved name). entity: "publisher" or "subscription"."""
     given = _given(node).get(_name(entity, topic, "reliability"))
     return default if given is None else ReliabilityPolicy[given.value.upper()]
 

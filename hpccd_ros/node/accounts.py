@@ -161,6 +161,6 @@ class RejectionLog:
 
 
 def _robot(rejection: Rejection) -> str:
-    """Of which the mesh is a link; "": of none."""
+    """The robot of which the mesh is a link; "": none."""
     robot, slash, _ = rejection.mesh.partition("/")
     return robot if slash and rejection.what is Input.VERTICES else ""

@@ -200,7 +200,7 @@ class DetectJobs:
                 executor.wake()  # a task that awaits is only looked at when the executor wakes up
 
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        # Of a group of its own, which ends with it: a group remembers every timer that it ever had.
+        # In a group of its own, which ends with it: a group keeps every timer that was ever added.
         timer = self._node.create_timer(
             ticket.time_limit, settle, callback_group=ReentrantCallbackGroup(), clock=steady
         )

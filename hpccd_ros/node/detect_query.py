@@ -18,11 +18,11 @@ from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.middleware import contact_messages, result_fields, snapshot_messages
 
-# Of the service and of the action: the same fields.
+# Service and action have the same fields.
 Request = Detect.Request | DetectAction.Goal
 Response = Detect.Response | DetectAction.Result
 
-# What is done for a request, in this order.
+# Stages of a request, in this order.
 WAITING = DetectAction.Feedback.WAITING
 READING = DetectAction.Feedback.READING
 BUILDING = DetectAction.Feedback.BUILDING

@@ -15,7 +15,7 @@ from hpccd_ros.middleware import fields
 # Colour-blind safe pair (Okabe and Ito): vertex-face orange, edge-edge blue.
 _VERTEX_FACE = ColorRGBA(r=0.90, g=0.62, b=0.0, a=1.0)
 _EDGE_EDGE = ColorRGBA(r=0.0, g=0.45, b=0.70, a=1.0)
-# Of the same set: sky blue.
+# From the same palette: sky blue.
 _NEAR = ColorRGBA(r=0.34, g=0.71, b=0.91, a=1.0)
 _NORMAL_LENGTH = 10.0  # in point diameters
 

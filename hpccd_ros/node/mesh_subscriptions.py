@@ -29,7 +29,7 @@ UNREADABLE = "a message cannot be deserialised; build its publisher with the sam
 
 @dataclass(eq=False)
 class Reception:
-    """What all topics of a mesh have in common: who listens, and where messages go, which may change."""
+    """Common data of all topics of a mesh: the node, and the receivers of messages, which may change."""
 
     node: Node
     mesh: str
@@ -87,7 +87,7 @@ class MeshTopic:
 
     @property
     def name(self) -> str:
-        """Of the topic, in full."""
+        """Full name of the topic."""
         return self._subscription.topic
 
     @property
@@ -274,7 +274,7 @@ class MeshSubscriptions:
         return not (self._by_file or topic.received or topic.relative_name in of.accounts.heard)
 
     def warnings(self) -> list[str]:
-        """What is odd about the publishers of the mesh."""
+        """Warnings about the publishers of the mesh."""
         found = [(topic.publishers, topic.name) for topic in self._positions]
         several = [f"{publishers} publishers on {name}" for publishers, name in found if publishers > 1]
         unconnected = [line for topic in self.topics for line in topic.warnings()]

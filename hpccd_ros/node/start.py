@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where the process of the node begins: told to end before it has begun, it ends as told.
 
-Loading the rest takes half a second, in which Python's own response to SIGINT would be a traceback. What comes before
-these lines is the interpreter's own start.
+Loading the rest takes half a second, in which Python's own response to SIGINT would be a traceback. Only the
+interpreter's own start comes before these lines.
 """
 
 import itertools

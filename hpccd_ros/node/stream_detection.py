@@ -154,7 +154,7 @@ class StreamDetection:
         return {mesh.name: self._pipeline.topology(mesh.name) for mesh in self._builder.meshes}
 
     def warnings(self) -> list[str]:
-        """What is odd about the publishers."""
+        """Warnings about the publishers."""
         of_links = [
             lines[0] + (f"; {counted(len(lines) - 1, 'more link')} of it waiting" if len(lines) > 1 else "")
             for robot in self._configuration.robots.values()
@@ -220,7 +220,7 @@ class Subscriptions:
         self._of_others.clear()
 
     def warnings(self) -> list[str]:
-        """What is odd about the publishers."""
+        """Warnings about the publishers."""
         return [line for part in (*self._of_meshes, *self._of_others) for line in part.warnings()]
 
     def silent(self) -> list[str]:

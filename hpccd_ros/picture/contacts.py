@@ -24,7 +24,7 @@ FAINT = "#8a93a6"
 MESH_COLOURS = ("#56759f", "#c3c9d4", "#5f8f83", "#7f8aa8", "#8fa3b8", "#a0937d")
 # From the start of the step to its end; light enough at both ends to be seen on any of the above.
 TOC_COLOURS = LinearSegmentedColormap.from_list("toc", ["#fff38a", "#ffb52e", "#ff5f45", "#f03fa0", "#b46bff"])
-# Of faces that intersect another mesh.
+# Colour of faces that intersect another mesh.
 INTERSECTING = "#2fd3ab"
 SUPERSAMPLING = 2
 MOST_NAMES = 8  # in the legend
@@ -33,7 +33,7 @@ LIGHT = np.array([0.35, -0.55, 1.25])
 
 @dataclasses.dataclass
 class Picture:
-    """What is drawn of a step: name of each mesh, its vertices in the middle of the step, its faces, and its edges
+    """The drawn parts of a step: name of each mesh, its vertices in the middle of the step, its faces, and its edges
     beside theirs; contacts at their points (N,3), and their times of impact.
 
     intersecting: (F,) which faces of all meshes, one after the other, intersect another mesh; None: not known.
@@ -133,14 +133,14 @@ def scene_indices(indices, sizes):
 
 
 def mesh_groups(names) -> list[str]:
-    """Of each mesh what it is a part of: links ROBOT/LINK of their robot, others of themselves."""
+    """Group of each mesh: links ROBOT/LINK belong to their robot, other meshes to themselves."""
     robots = [name.partition("/")[0] for name in names]
     links = Counter(robots)
     return [robot if links[robot] > 1 else name for robot, name in zip(robots, names, strict=True)]
 
 
 def mesh_colours(names) -> list[str]:
-    """Of each mesh, the links of a robot alike."""
+    """Colour of each mesh; the links of a robot have one."""
     groups = mesh_groups(names)
     number = {group: k for k, group in enumerate(dict.fromkeys(groups))}
     return [MESH_COLOURS[number[group] % len(MESH_COLOURS)] for group in groups]
@@ -152,7 +152,7 @@ def toc_colours(toc) -> np.ndarray:
 
 
 def _paint(vertices, faces, contacts, intersecting):
-    """What `shade` takes as `paint`."""
+    """The argument `paint` of `shade`."""
     points, toc = contacts or (np.empty((0, 3)), np.empty(0))
     tint = Tint(np.asarray(points, np.float64).reshape(-1, 3), toc_colours(toc), vertices)
     # The last one is that of all further triangles: tubes around edges.

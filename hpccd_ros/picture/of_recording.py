@@ -56,7 +56,7 @@ def draw_step(
 
 
 def facts(step: ReplayedStep) -> list[str]:
-    """What a line beneath the title says of a step that was computed."""
+    """The line beneath the title, about a computed step."""
     found = step.contacts
     triangles, edges = (sum(len(getattr(t, kind)) for t in step.end_frame.topologies) for kind in ("faces", "edges"))
     lines = [

@@ -7,7 +7,7 @@ import numpy as np
 # Beyond this distance from a contact nothing is tinted: a part of the scene's largest extent, whatever the size of the
 # faces.
 RADIUS = 0.025
-# Of the grid to the radius; and the largest share of the tint in a colour.
+# Cells of the grid per radius; and the largest share of the tint in a colour.
 CELLS = 5
 STRENGTH = 0.6
 
@@ -18,7 +18,7 @@ class Tint:
     def __init__(self, places: np.ndarray, colours: np.ndarray, vertices: np.ndarray):
         low, high = vertices.min(axis=0), vertices.max(axis=0)
         radius = RADIUS * float((high - low).max())
-        # Of a fast step, contacts may lie far from where the surfaces are drawn.
+        # In a fast step, contacts may lie far from where the surfaces are drawn.
         near = ((places >= low - radius) & (places <= high + radius)).all(axis=1)
         places, colours = places[near], colours[near]
         self._any = len(places) > 0 and radius > 0
@@ -27,7 +27,7 @@ class Tint:
         self._cell = radius / CELLS
         self._low = places.min(axis=0) - CELLS * self._cell
         self._shape = np.ceil(np.ptp(places, axis=0) / self._cell).astype(int) + 2 * CELLS + 2
-        # Of no offset, as an index behind the first cell.
+        # Offset zero, as an index behind the first cell.
         centre = np.ravel_multi_index((CELLS, CELLS, CELLS), self._shape)
         at = np.rint((places - self._low) / self._cell).astype(int)
         cells, number = np.unique(np.ravel_multi_index(tuple(at.T), self._shape), return_inverse=True)

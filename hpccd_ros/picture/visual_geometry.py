@@ -16,7 +16,7 @@ class VisualGeometry:
     def __init__(self, robots: Mapping[str, Robot]) -> None:
         self._meshes = {mesh.name: (robot, mesh) for robot, of in robots.items() for mesh in of.meshes}
 
-        #: Of each link ROBOT/LINK that has visual geometry.
+        #: Topology of each link ROBOT/LINK that has visual geometry.
         self.topologies: dict[str, Topology] = {name: mesh.topology for name, (_, mesh) in self._meshes.items()}
 
     def vertices(self, names: Sequence[str], frame: SceneFrame) -> dict[str, np.ndarray]:

@@ -54,7 +54,7 @@ def main(args) -> int:
 
 
 def _rows(distributed, args) -> list[dict]:
-    """What came of each recording, in the order in which they were given."""
+    """The outcome of each recording, in the given order."""
     paths = [str(Path(path).absolute()) for path in args.files]
     with _cluster(distributed, args, len(paths)) as (client, threads):
         options = {

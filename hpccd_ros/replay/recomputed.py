@@ -60,7 +60,7 @@ class ReplayedStep:
 
 @dataclasses.dataclass(eq=False)
 class _Session:
-    """What the results since the node was configured imply for later ones. history: transforms or joint states move
+    """State from the results since the node was configured, for later ones. history: transforms or joint states move
     meshes, so that frames depend on earlier messages. ``computed``: the frames of a result existed. ``lacks_early``:
     inputs from before the recording are missing. ``uncertain``: later inputs are missing, in words. ``first``: stamp at
     which the first of these results ends. ``settled``: nothing depends on that history any more.

@@ -99,7 +99,7 @@ def _text(recording, attachment: str, path: str) -> str:
 
 
 def _resolver(recording, name: str, values: Mapping[str, Any], text: str, folder: Path) -> Resolver:
-    """Of what is attached a copy in ``folder``, of all else the file itself."""
+    """A copy in ``folder`` of each attached file, otherwise the file itself."""
     description = values["description"]
     otherwise = robot_files.resolver(None if robot_parameters.comes_on_topic(description) else description)
 

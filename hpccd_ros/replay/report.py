@@ -196,7 +196,7 @@ class Summary:
             self.accuracies.add(step.recorded.accuracy)
 
     def row(self, path, replay) -> dict:
-        """What came of it, JSON-able."""
+        """The outcome, JSON-able."""
         distances = replay.distances
         if replay.diverged:
             result, first = "DIVERGED", replay.first_divergence

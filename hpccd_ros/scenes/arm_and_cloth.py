@@ -16,7 +16,7 @@ from hpccd_ros.scenes.scene import Frame, Mesh, Scene
 BOARD = 0.03  # thickness of the table's top
 TABLE_CELL = 0.05
 
-# What the numbers depend on.
+# Modules that the numbers depend on.
 SOURCES = [arm, cloth, dragged_cloth, gripper]
 
 

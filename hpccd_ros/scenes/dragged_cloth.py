@@ -103,7 +103,7 @@ def _laid_out(setup, seed):
 
 
 def _holds(holds, time, p, gripper, setup):
-    """What holds the cloth at `time`: first the fingertips, then also the closed fingers, then nothing."""
+    """The holders of the cloth at `time`: first the fingertips, then also the closed fingers, then nothing."""
     if not arm.CLOSING[0] <= time < arm.OPENING[0]:
         return []
     if holds and (time < arm.CLOSING[1] or len(holds) > 1):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from hpccd_ros.middleware import mesh_cdr, message_types, topic_names
 from hpccd_ros.scenes.scene import Frame, Scene
 
-# Of all that a scene sends.
+# Coordinate frame of all messages of a scene.
 FRAME_ID = "world"
 
 

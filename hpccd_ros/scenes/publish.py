@@ -73,7 +73,7 @@ def publish(
             if results is not None and not results.await_node(wait, stop) and not stop:
                 print("no node publishes contacts: publishing all the same", file=sys.stderr, flush=True)
             count = _play(node, scene, publishers, results, rate, loop, wait, stop, progress)
-            # What is still on its way must not be cut off by the end of this process.
+            # The end of this process must not cut off messages in transport.
             await_acknowledged(publishers.values(), LAST)
             return count
         finally:
@@ -108,7 +108,7 @@ def _play(node, scene, publishers, results, rate, loop, wait, stop, progress) ->
             count += 1
             if results is not None:
                 results = _await_result(results, publishers, frame, stamp, wait, stop)
-                # What was waited is not made up for: frames that follow at once would wait for each other.
+                # Lost time is not made up for: frames that follow at once would wait for each other.
                 begin = max(begin, time.monotonic() - count / rate)
     return count
 

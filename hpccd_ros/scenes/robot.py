@@ -54,7 +54,7 @@ class SceneRobot:
         )
 
     def joint_positions(self, time: float) -> dict[str, float]:
-        """Of each joint that moves and mimics none: multiples of 1 / JOINT_STEPS, which is what is published."""
+        """Published value of each joint that moves and mimics none: multiples of 1 / JOINT_STEPS."""
         values = self.motion(time)
         return {name: round(values[name] * JOINT_STEPS) / JOINT_STEPS for name in self.robot.kinematics.inputs}
 
@@ -66,7 +66,7 @@ class SceneRobot:
 
     @cached_property
     def _corners(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of all meshes in their links' frames, the number of the link of each, and where a mesh ends."""
+        """Vertices of all meshes in their links' frames, the number of the link of each, and where a mesh ends."""
         meshes = self.robot.meshes
         counts = [len(mesh.vertices) for mesh in meshes]
         corners = np.concatenate([mesh.vertices for mesh in meshes])
@@ -75,7 +75,7 @@ class SceneRobot:
 
     @cached_property
     def _chain(self) -> tuple[np.ndarray, ...]:
-        """Of the joint of each link: axis where it turns, else 0; axis where it slides, else 0; origin's quaternion
+        """For the joint of each link: axis where it turns, else 0; axis where it slides, else 0; origin's quaternion
         (w first) and shift."""
         chain = self.robot.kinematics.chain.joints
         axes = np.array([joint.axis for joint in chain])

@@ -3,7 +3,7 @@
 
 After the twisted rods that the literature of incremental potential contact measures on; its sizes, not its data.
 A closed form, no simulation. The straight bundle is carried by one smooth map of space, which cannot make
-disjoint rods meet: layers stay as far apart as they are made, at every twist. What meets are bulges that run along
+disjoint rods meet: layers stay as far apart as they are made, at every twist. The contacts are at bulges that run along
 the rods, together a little higher than the gap, and neighbouring turns of the coil.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a scene is: meshes, and for each frame where their vertices are."""
+"""A scene: meshes, and the positions of their vertices in each frame."""
 
 from __future__ import annotations
 

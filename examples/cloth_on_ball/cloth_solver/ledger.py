@@ -14,9 +14,9 @@ from cloth_solver.springs import Springs
 
 @dataclass(frozen=True)
 class State:
-    """Of the cloth: momentum (3,) kg m/s, energies in J, angular momentum about z in kg m^2/s.
+    """State of the cloth: momentum (3,) kg m/s, energies in J, angular momentum about z in kg m^2/s.
 
-    turning: the same with what turns the one way and the other added up, not set off.
+    turning: the same with both directions of rotation added, not subtracted.
     """
 
     momentum: np.ndarray
@@ -32,7 +32,7 @@ class State:
 
 
 class Ledger:
-    """What came in since the start, beside what is there.
+    """Momentum and energy received since the start, besides the present ones.
 
     gravity, ball, air: (3,) momentum that each gave; ball_spin, air_spin: angular momentum about z; work: of the ball.
     """

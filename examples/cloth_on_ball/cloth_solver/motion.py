@@ -19,7 +19,7 @@ from cloth_solver.response import FromBall, ToAir, goals, respond
 from cloth_solver.setup import Setup
 from cloth_solver.springs import Springs
 
-# Of a move that is not free: so much of the free part is made. The rest is room for the next one.
+# Share of the free part that a blocked move takes. The rest leaves a gap for the next move.
 CAUTION = 0.9
 # Attempts to solve a move, each with the pairs that the one before ran into.
 ATTEMPTS = 4
@@ -27,7 +27,7 @@ ATTEMPTS = 4
 SWEEPS = 2
 # Pairs of a failed attempt are new to the next where it left them nearer than this part of the thickness.
 PRESSED = 0.6
-# Moves in a row of which less than this part could be made, before it is an error.
+# Consecutive moves that took less than this share, before it is an error.
 STUCK, PATIENCE = 0.01, 20
 
 

@@ -67,7 +67,7 @@ class Pairs:
 
     @staticmethod
     def of(near: Near, faces: np.ndarray, start: np.ndarray, end: np.ndarray, setup: Setup, n_cloth: int) -> Pairs:
-        """Of a detector's response to the way from `start` to `end` (V,3); faces (F,3) of the whole scene."""
+        """From a detector's result for the motion from `start` to `end` (V,3); faces (F,3) of the whole scene."""
         vf, ee = near.vf.astype(np.int64), near.ee.astype(np.int64)
         vertex = np.concatenate([np.column_stack([vf[:, 0], faces[vf[:, 1]]]), ee]).T.reshape(4, -1)
         toc = np.concatenate([near.vf_toc, near.ee_toc])[:, None]

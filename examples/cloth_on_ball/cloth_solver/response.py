@@ -13,13 +13,13 @@ from cloth_solver.setup import Setup
 # m/s at which surfaces that lie at their thickness are drawn apart, and faster the nearer they lie: at once would be an
 # explosion.
 RECOVERY = 0.1
-# Of a pair's push that is shared with others.
+# Over-relaxation of the push of a pair that shares vertices with others.
 RELAXATION = 1.5
 
 
 @dataclass
 class FromBall:
-    """What the ball gave the cloth: momentum (3,), angular momentum about z, work."""
+    """Momentum (3,), angular momentum about z and work from the ball to the cloth."""
 
     impulse: np.ndarray
     spin: float = 0.0
@@ -28,7 +28,7 @@ class FromBall:
 
 @dataclass
 class ToAir:
-    """What the air took from the cloth: momentum (3,), angular momentum about z."""
+    """Momentum (3,) and angular momentum about z from the cloth to the air."""
 
     impulse: np.ndarray
     spin: float = 0.0

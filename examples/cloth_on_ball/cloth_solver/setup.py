@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is simulated: a square cloth above a spinning ball."""
+"""The simulated scene: a square cloth above a spinning ball."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Setup:
 
     @property
     def mass(self) -> float:
-        """Of a vertex."""
+        """Mass of a vertex."""
         return self.density * self.side * self.side / (self.cells + 1) ** 2
 
     @property
@@ -70,7 +70,7 @@ class Setup:
         return 0.25 * self.thickness
 
     def angle(self, time: float) -> float:
-        """Of the ball (rad)."""
+        """Rotation of the ball (rad)."""
         ramp = min(time, self.spin_ramp)
         return self.spin * (0.5 * ramp * ramp / self.spin_ramp + (time - ramp))
 

@@ -16,7 +16,7 @@ struct WorkCounts {
   BatchCounts batches[3];  // by kind
   FallbackCounts fallbacks[3];
   double leaf_pairs_seconds = 0, kdop_seconds = 0;
-  // What the query tested, by kind; whether it searched the earliest contacts; and whether it was timed by stage.
+  // Kinds of pairs that the query tested; whether it searched the earliest contacts; whether it was timed by stage.
   bool asked[3] = {}, earliest = false, timed = false;
 
   void add(const std::vector<Worker>& workers);

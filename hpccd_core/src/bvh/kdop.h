@@ -35,8 +35,8 @@ struct alignas(64) KdopMargin {
 
 // The coordinate of x along direction k; the axes follow the directions of the k-DOP. It is one sum of two terms, one
 // of them possibly doubled, and is rounded once. This never reverses an order, so no margin is needed. (Sums of three
-// terms would need one. Of all directions that fit into a cache line besides the six diagonals, the last two left the
-// fewest pairs on the published scenes.)
+// terms would need one. Among all directions that fit into a cache line besides the six diagonals, the last two left
+// the fewest pairs on the published scenes.)
 HPCCD_HD double along(int k, const Vec3<double>& x) {
   switch (k) {
     case 0:

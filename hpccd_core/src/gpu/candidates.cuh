@@ -29,7 +29,7 @@ __device__ void flush_survivors(const LaunchParams<T>& params, CandidateQueue& s
   __syncwarp();
 }
 
-// Of the vertices of a pair (pair_vertices.h): the common start of p and a, then the ends of p, a and b.
+// Spans in the vertices of a pair (pair_vertices.h): the common start of p and a, then the ends of p, a and b.
 template <Kind kind>
 __device__ __forceinline__ uint4 span_ends(u32 v0, u32 v1, u32 v2, u32 v3) {
   using S = Spans<kind>;

@@ -20,12 +20,12 @@ inline constexpr int integer_sizes = 2;
 struct WorldCounters {
   u64 extent_low[3], extent_high[3];  // maximum of the ordered bits, of low values negated: zero is neutral
   u64 floats_suffice;                 // for a fast frame: whether floats suffice (scene/edge_sample.h)
-  // Of the results; first_toc is the complement of the bits of the earliest time, first_key that of the first key.
+  // About the results; first_toc is the complement of the bits of the earliest time, first_key that of the first key.
   u64 hash, first_toc, first_key;
 };
 
 struct Counters {
-  // Of a single world. Several worlds have their own counters; then hash and first_toc here are those of all worlds.
+  // For a single world. Several worlds have their own counters; then hash and first_toc here are those of all worlds.
   WorldCounters world;
   u64 bad;             // invalid coordinates
   u64 floats_suffice;  // for a fast frame: the number of worlds for which floats suffice

@@ -51,7 +51,7 @@ __device__ inline Motion<float> load_rounded_motion(const DevicePoint* points, u
   return motion_of<kind>(t0, t1);
 }
 
-// Of an edge or of a face.
+// The vertices of an edge or a face.
 struct VertexNumbers {
   u32 v[3];
   __device__ u32 operator[](int i) const { return v[i]; }

@@ -14,7 +14,7 @@ struct StagedLeaves : CandidateQueue {
   // The second features of pairs: edges of the second leaf, its faces, and those of the first.
   __device__ static constexpr u32 faces_at(u32 side) { return most_edges + (side ? 0 : most_faces); }
   static constexpr u32 n_second = most_edges + 2 * most_faces;
-  // Of both leaves, at both ends. Tags: the vertex; the amount by which boxes grow at the second end.
+  // Corners of both leaves, at both ends. Tags: the vertex; the amount by which boxes grow at the second end.
   Bound corner[2][2][most_corners];
   // The four words of a box are stored separately, so that neighbouring lanes read neighbouring words: low at both
   // ends, high.

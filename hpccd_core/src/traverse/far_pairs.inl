@@ -111,7 +111,7 @@ void far_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedF
   const std::uint32_t *corners = tree.corners.data(), *edges = tree.edge_of_slot.data(),
                       *faces = tree.face_of_slot.data();
   if (a.n_edges() && b.n_edges()) {
-    // Of two edges the one with the lower number comes first, which is that of the mesh with the lower number.
+    // The edge with the lower number comes first, which is that of the mesh with the lower number.
     const bool in_order = edges[a.first_edge] < edges[b.first_edge];
     const LeafRange &first = in_order ? a : b, &second = in_order ? b : a;
     add_near(edges_of(first, features_of(first)), edges + first.first_edge, edges_of(second, features_of(second)),

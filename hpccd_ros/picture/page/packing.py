@@ -13,7 +13,7 @@ from hpccd_ros.detect.layout import Layout
 from hpccd_ros.frames.types import Topology
 from hpccd_ros.middleware.contact_messages import FeaturePairs, fill_pairs
 
-# Of zlib: 9 takes twice as long for 1 % less.
+# Level of zlib: 9 takes twice as long for 1 % less.
 LEVEL = 7
 
 
@@ -115,12 +115,12 @@ class MeshPositions:
 
 # Drawn of one step: more could not be told apart, and would be most of the page.
 MOST = 20_000
-# Of times of contact, which are 0..1.
+# Steps of times of impact, which are 0..1.
 TIMES = 65535
 
 
 class ContactColumns:
-    """Of each step the vertex-face contacts, then the edge-edge ones, with meshes and features as in ContactArray."""
+    """The vertex-face contacts of each step, then the edge-edge ones, with meshes and features as in ContactArray."""
 
     def __init__(self):
         self._meshes = [np.empty((0, 2), np.uint32)]
@@ -157,7 +157,7 @@ class ContactColumns:
 
 
 class FaceLists:
-    """Of each step the faces of each mesh that intersect another mesh, own numbers, one mesh after the other."""
+    """For each step the faces of each mesh that intersect another mesh: their numbers in it, mesh after mesh."""
 
     def __init__(self):
         self._faces = [np.empty(0, np.uint32)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a page holds of a replayed recording, and what it says about it in words."""
+"""The data of a page about a replayed recording, and its texts."""
 
 import itertools
 from collections import Counter

@@ -77,7 +77,7 @@ struct RoundedLanes {
   Vec3<Single> t0, t1;
 };
 HPCCD_HD RoundedLanes transposed(const RoundedRows& r) {
-  // Of four rows: t0 in the low half, t1 in the high one.
+  // For four rows: t0 in the low half, t1 in the high one.
   __m256 x[2], y[2], z[2];
   for (int i = 0; i < 2; ++i) {
     const __m256* p = r.row + 4 * i;

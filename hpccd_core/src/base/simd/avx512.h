@@ -100,7 +100,7 @@ struct RoundedLanes {
   Vec3<Single> t0, t1;
 };
 HPCCD_HD RoundedLanes transposed(const RoundedRows& r) {
-  // Of rows i to i + 3 in turn: x, y and z of four, at t0 and at t1, and the same of the four rows behind them.
+  // For rows i to i + 3 in turn: x, y and z of four, at t0 and at t1, and the same for the four rows behind them.
   __m512 x[2], y[2], z[2];
   for (int i = 0; i < 2; ++i) {
     const __m512* p = r.pair + 4 * i;

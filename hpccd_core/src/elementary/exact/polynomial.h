@@ -6,7 +6,7 @@
 
 namespace hpccd::exact {
 
-// Of degree at most D.
+// A polynomial of degree at most D.
 template <class Z, int D>
 struct Polynomial {
   std::array<Z, D + 1> c;  // coefficient of t^i

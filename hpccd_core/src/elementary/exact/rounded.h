@@ -28,7 +28,7 @@ struct Rounded {
       if (sign_of(b[i], halvings) != s) return 0;
     return s;
   }
-  // Whatever the uncertain signs are: one change of sign, so one simple root.
+  // For any values of the uncertain signs there is one change of sign, so one simple root.
   bool certainly_one_root(int halvings) const {
     const int first = sign_of(b[0], halvings);
     if (first * sign_of(b[D], halvings) >= 0) return false;

@@ -118,7 +118,7 @@ function triangle(context, x, y) {
   context.fill();
 }
 
-// What the axis has to hold: the largest 5 % of the values, such as those of a warm-up, do not rule it.
+// The range of the axis: the largest 5 % of the values, such as those of a warm-up, do not determine it.
 function usual(values) {
   const sorted = [...values].sort((a, b) => a - b), most = sorted.at(-1);
   const common = sorted[Math.max(0, sorted.length - 1 - Math.max(1, Math.floor(sorted.length / 20)))];

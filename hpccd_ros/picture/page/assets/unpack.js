@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 "use strict";
 
-// What packing.py packed: groups * rows * width integers of 2 or 4 bytes, as a typed array.
+// Unpacks data of packing.py: groups * rows * width integers of 2 or 4 bytes, as a typed array.
 async function unpack(id, bytesEach, groups, rows, width) {
   const text = atob(document.getElementById(id).textContent);
   const compressed = new Uint8Array(text.length);
