@@ -110,7 +110,7 @@ def test_meshes_of_several_topologies_and_meshes_at_rest(hpccd, tmp_path):
     statue, _, ground = page.said["meshes"]
     assert len(statue["topologies"]) > 1
     assert [topology["frames"] for topology in ground["topologies"]] == [1], "what rests is stored once"
-    assert page.said["notes"][0].startswith("The recording holds no results of a node")
+    assert page.said["notes"][0].startswith("The recording contains no results of a node")
     gaps = [step["gap"] for step in page.said["steps"]]
     numbers = [int(step["step"]) for step in page.said["steps"]]
     assert gaps == [0, *(np.diff(numbers) - 1)] and sum(gaps) > 0
@@ -178,16 +178,16 @@ def test_what_is_missing_truncated_or_different_is_said(hpccd, small_bag, tmp_pa
     assert told["42"] == [f"2 steps right before this one: no result {recording_page.GAP}."]
     assert "contacts were recorded, now there are" in told["20"][0]
     total = next(step["total"] for step in page.said["steps"] if step["step"] == "60")
-    assert told["60"] == [f"The recorded result held only the 5 earliest of {total} contacts (max_contacts)."]
+    assert told["60"] == [f"The recorded result holds only the 5 earliest of {total} contacts (max_contacts)."]
     numbers = [step["step"] for step in page.said["steps"]]
     assert page.said["meshes"][0]["shown"][numbers.index("31")] is None
     assert page.said["meshes"][0]["shown"][numbers.index("32")] is not None, "its end is drawn"
     assert [step["total"] for step in page.said["steps"] if step["step"] in ("31", "32")] == [None, None]
     notes = "\n".join(page.said["notes"])
     for part in (
-        "2 of 87 steps could not be computed",
-        "1 of 87 steps were recorded with other contacts",
-        "1 of 87 steps had their recorded result truncated",
+        "2 of 87 steps: not computed",
+        "1 of 87 steps: recorded result differs",
+        "1 of 87 steps: recorded result truncated",
         "The node had dropped 3 frames",
     ):
         assert part in notes
@@ -199,7 +199,7 @@ def test_of_many_contacts_some_are_drawn_over_the_whole_step(small_bag, tmp_path
     few, many = page.said["steps"]
     assert few["notices"] == [] and sum(few["drawn"]) == few["total"]
     assert many["total"] > 300 and sum(many["drawn"]) == 50
-    assert many["notices"] == [f"Drawn are 50 of {many['total']} contacts, evenly from the earliest on."]
+    assert many["notices"] == [f"50 of {many['total']} contacts are drawn, sampled evenly in order of TOI."]
     step = steps_of(small_bag)[79]
     toc = np.sort(page.contacts(1)["toc"])
     assert toc[0] == pytest.approx(step.contacts.first_toc, abs=1e-5) and toc[-1] > 0.9

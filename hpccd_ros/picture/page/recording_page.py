@@ -25,7 +25,7 @@ from hpccd_ros.scenes.progress import track
 # Bytes of positions that a browser is asked to hold.
 MOST_POSITIONS = 1 << 29
 # Why there may be nothing of a step.
-GAP = "(dropped, not recorded, or begun with another topology)"
+GAP = "(dropped, not recorded, or started with another topology)"
 # Colours of times of contact between which the page blends.
 TOC_SHADES = 33
 
@@ -124,20 +124,20 @@ class RecordingPage:
             self._missing += 1
             yield f"No contacts are shown for this step: {step.missing}."
         if step.end_frame is None:
-            yield "Nothing is drawn: the recording holds no positions of all meshes at the end of this step."
+            yield "Nothing is drawn: positions of some meshes at the end of this step are not in the recording."
         if step.difference:
             self._differ += 1
-            yield f"The recorded result was another one: {step.difference}."
+            yield f"The recorded result differs: {step.difference}."
         recorded = step.recorded
         if recorded is not None and recorded.truncated:
             self._truncated += 1
             yield (
-                f"The recorded result held only the {len(recorded.kind):,} earliest of {recorded.total:,} contacts "
+                f"The recorded result holds only the {len(recorded.kind):,} earliest of {recorded.total:,} contacts "
                 "(max_contacts)."
             )
         if step.total > drawn:
             self._cut += 1
-            yield f"Drawn are {drawn:,} of {step.total:,} contacts, evenly from the earliest on."
+            yield f"{drawn:,} of {step.total:,} contacts are drawn, sampled evenly in order of TOI."
 
     def described(self) -> tuple[dict, dict[str, bytes]]:
         """(what the page says, as JSON can hold it, {name: bytes} of what it draws)."""
@@ -186,21 +186,21 @@ class RecordingPage:
         replay = self._replay
         notes = []
         if not replay.recorded_results:
-            notes.append("The recording holds no results of a node: contacts were computed from its frames.")
+            notes.append("The recording contains no results of a node: contacts were computed from its frames.")
         if self._every > 1:
             notes.append(f"Each {_ordinal(self._every)} step of the recording is shown (--every {self._every}).")
         for count, what in (
-            (self._missing, "could not be computed: their contacts are not shown"),
-            (self._differ, "were recorded with other contacts than those computed again, which are shown"),
-            (self._truncated, "had their recorded result truncated (max_contacts); all contacts were computed again"),
-            (self._cut, f"have more than {MOST:,} contacts; only these are drawn"),
+            (self._missing, "not computed; their contacts are not shown"),
+            (self._differ, "recorded result differs; the contacts computed again are shown"),
+            (self._truncated, "recorded result truncated (max_contacts); all contacts were computed again"),
+            (self._cut, f"more than {MOST:,} contacts; only {MOST:,} are drawn"),
         ):
             if count:
-                notes.append(f"{count:,} of {_count(len(self._steps), 'step')} {what}.")
+                notes.append(f"{count:,} of {_count(len(self._steps), 'step')}: {what}.")
         if left_out:
             notes.append(f"{_count(left_out, 'step')} between the first and the last one: no result {GAP}.")
         if self._dropped:
-            notes.append(f"The node had dropped {_count(self._dropped, 'frame')} when it gave the last result.")
+            notes.append(f"The node had dropped {_count(self._dropped, 'frame')} by the last result.")
         return notes
 
 

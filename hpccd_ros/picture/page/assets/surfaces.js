@@ -17,7 +17,8 @@ class Surfaces {
     this.tint = new Tint(recording);
     this.tint.paint(this.material);
     this.marks = this.material.clone(); // without the offset: in front of the surface
-    this.marks.setValues({ vertexColors: false, color: recording.colours.intersecting, polygonOffset: false, transparent: true, opacity: 0.55 });
+    this.marks.setValues({ vertexColors: false, polygonOffset: false, transparent: true, opacity: 0.7 });
+    this.marks.color.set(recording.colours.intersecting).convertSRGBToLinear();
     this.edges = new THREE.MeshBasicMaterial({ color: 0x0a0d13, wireframe: true, transparent: true, opacity: 0.35 });
     this.points = new THREE.PointsMaterial({ vertexColors: true, size: 3 * devicePixelRatio, sizeAttenuation: false });
     this.lines = new THREE.LineBasicMaterial({ vertexColors: true });

@@ -128,7 +128,7 @@ class Viewer {
     try {
       this.stage = new Stage(byId("scene"), recording);
     } catch (error) {
-      halt(`This browser gives no WebGL, so meshes and contacts cannot be drawn; the chart is right. (${error.message})`);
+      halt(`WebGL: not available in this browser (${error.message}); only the chart is drawn.`);
     }
     this.chart = new Chart(byId("chart"), recording, (step) => this.choose(step));
     this.times = new Times(byId("times"), recording);
@@ -163,7 +163,8 @@ class Viewer {
     const { step: number, total, facts, notices, time } = steps[step];
     const what = total === null ? "No contacts known" : `${total.toLocaleString("en")} contact${total === 1 ? "" : "s"}`;
     byId("title").textContent = `${what} in step ${number} of ${steps.at(-1).step}`;
-    byId("facts").textContent = facts.join("  ·  ") || "\u00a0";
+    // Lines break between facts only.
+    byId("facts").textContent = facts.map((fact) => fact.replaceAll(" ", "\u00a0")).join("  ·  ") || "\u00a0";
     const calm = total === 0 ? ["Nothing touches in this step."] : [];
     byId("notices").replaceChildren(...notices.map((text) => item(text)), ...calm.map((text) => item(text, "calm")));
     byId("slider").value = step;
@@ -286,11 +287,11 @@ class Viewer {
       .map((mesh) => `${mesh.name}: ${short(mesh.step)}`).join(", ");
     byId("notes").replaceChildren(...[
       ...notes,
-      "Contacts are those of the recorded frames, computed again when this page was written; milliseconds are those of that "
-      + "computation, for a recording holds none. Where the recorded result was another one, the step says so.",
-      `Positions are rounded to steps in the unit of length of the scene, so they may be off by half a step along each axis. `
-      + `${rounded}; points of contacts: ${short(contacts.step)}. Times of contact are rounded to 1/${contacts.times}.`,
-      `Drawn with three.js r${library.revision}, as ${library.source} carries it. This file needs no network, and asks for none.`,
+      "Contacts were computed again from the recorded frames when this page was written; milliseconds are those of that "
+      + "computation. A step whose recorded result differs has a notice.",
+      `Positions are rounded to multiples of these lengths, in the unit of the scene: `
+      + `${rounded}; points of contacts: ${short(contacts.step)}. Times of impact are rounded to 1/${contacts.times}.`,
+      `Drawn with three.js r${library.revision}, bundled with ${library.source}. This file uses no network.`,
     ].map((text) => item(text)));
     const warnings = notes.length;
     if (warnings) document.querySelector("aside > details").open = true;
@@ -358,7 +359,7 @@ class Viewer {
 }
 
 function sizeOf(mesh, steps) {
-  if (!mesh.topologies.length) return "no frame of it";
+  if (!mesh.topologies.length) return "no frames";
   const last = mesh.topologies.at(-1), versions = mesh.topologies.length;
   const count = (kind) => last[kind].toLocaleString("en");
   const faces = last.faces ? `${count("faces")} triangles` : "", edges = last.edges ? `${count("edges")} edges` : "";
