@@ -60,11 +60,13 @@ def choice(name: str, value: Word, choices: Iterable[str]) -> Word:
 
 
 def hide_unnamed(function: Callable[..., object]) -> None:
-    """Leave out ``*unnamed`` and ``**unknown`` of the signature that help() shows: they are there for their errors."""
+    """Shorten the signature that help() shows: without annotations, as the docstring has the types, and without
+    ``*unnamed`` and ``**unknown``, which are there for their errors.
+    """
     signature = inspect.signature(function)
     extra = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
-    shown = [parameter for parameter in signature.parameters.values() if parameter.kind not in extra]
-    function.__signature__ = signature.replace(parameters=shown)  # type: ignore[attr-defined]
+    parameters = [p.replace(annotation=p.empty) for p in signature.parameters.values() if p.kind not in extra]
+    function.__signature__ = signature.replace(parameters=parameters, return_annotation=signature.empty)  # type: ignore[attr-defined]
 
 
 def did_you_mean(word: str, choices: Iterable[str]) -> str:

@@ -115,6 +115,8 @@ class Detector(
 
     Notes
     -----
+    All queries take their positions and `stream` as :meth:`detect` does, and raise the same errors.
+
     One call at a time: calls from several Python threads wait for each other; only :meth:`cancel` does not. A child
     process made by os.fork() cannot use a detector with more than one thread. Detectors cannot be pickled.
 
@@ -282,21 +284,15 @@ class Detector(
 
         Parameters
         ----------
-        vertices : Positions, shape (V, 3), float32 or float64
-            As for :meth:`detect`; they are copied. Rejected positions do not count: the next step starts where this
-            one would have. Device arrays must not alternate with host arrays; call :meth:`reset` in between.
+        vertices : Positions, shape (V, 3)
+            They are copied. Rejected positions do not count: the next step starts where this one would have. Device
+            arrays must not alternate with host arrays; call :meth:`reset` in between.
         stream : Stream, optional
-            As for :meth:`detect`.
 
         Returns
         -------
         Contacts or DeviceContacts
             The first call, and the first after :meth:`reset`, returns no contacts.
-
-        Raises
-        ------
-        TypeError, ValueError
-            As :meth:`detect` raises.
         """
         made_on = device_arrays.stream_number(stream)
         with self._stepping:

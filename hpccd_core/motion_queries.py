@@ -39,7 +39,8 @@ class MotionQueries(Generic[MotionResult, StepResult]):
         vertices_t0, vertices_t1 : Positions, shape (V, 3), float32 or float64
             Positions of all vertices at both ends of the step: one array, meshes concatenated in the order added, or
             a dict {mesh name: (n, 3) array}. With W worlds, (W, V, 3). C-contiguous arrays are read in place, also in
-            a GPU's memory (CUDA array interface or DLPack, backend "gpu" or "auto"). Coordinates up to 1e150.
+            a GPU's memory (CUDA array interface or DLPack, backend "gpu" or "auto"). Coordinates up to 1e150 in
+            motions, 1e300 in queries of one snapshot.
         stream : Stream, optional
             CUDA stream that wrote the device arrays; by default all work on the device comes first. The result is
             complete when the call returns.
@@ -55,6 +56,8 @@ class MotionQueries(Generic[MotionResult, StepResult]):
             If an array has the wrong dtype or masked elements.
         ValueError
             If a shape is wrong, a coordinate is NaN, infinite or too large, or a static mesh moves.
+        Cancelled
+            After :meth:`cancel`.
         """
         found = self._of_motion("detect", vertices_t0, vertices_t1, stream)
         return cast(MotionResult, self._contacts(found))
@@ -64,21 +67,14 @@ class MotionQueries(Generic[MotionResult, StepResult]):
 
         Parameters
         ----------
-        vertices_t0, vertices_t1 : Positions
-            As for :meth:`detect`.
+        vertices_t0, vertices_t1 : Positions, shape (V, 3)
         stream : Stream, optional
-            As for :meth:`detect`.
 
         Returns
         -------
         float, or ndarray of shape (W,) with worlds
             In [0, 1]; 1.0 if there is no contact, 0.0 if there is one at the start. "exact" and "conservative": never
             larger than the true earliest time of impact, at most 1e-9 smaller.
-
-        Raises
-        ------
-        TypeError, ValueError
-            As :meth:`detect` raises.
 
         Notes
         -----
@@ -97,12 +93,11 @@ class MotionQueries(Generic[MotionResult, StepResult]):
 
         Parameters
         ----------
-        vertices_t0, vertices_t1 : DeviceArrayLike
+        vertices_t0, vertices_t1 : DeviceArrayLike, shape (V, 3)
             They are read in place each time, and must stay there.
         room : float
             Lists hold this many times, 1 to 1000, what the present motion needs; it is detected once to find out.
         stream : Stream, optional
-            As for :meth:`detect`.
 
         Returns
         -------
@@ -110,8 +105,6 @@ class MotionQueries(Generic[MotionResult, StepResult]):
 
         Raises
         ------
-        TypeError, ValueError
-            As :meth:`detect` raises.
         RuntimeError
             If the GPU fails.
         """

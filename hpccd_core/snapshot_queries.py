@@ -30,24 +30,17 @@ class SnapshotQueries(Generic[ProximityResult, IntersectionsResult, DistancesRes
 
         Parameters
         ----------
-        vertices : Positions
-            As for :meth:`detect`; coordinates up to 1e300.
+        vertices : Positions, shape (V, 3)
         distance : float
             Euclidean, in the unit of the coordinates; 0 reports contact. Neighbours within a mesh are reported
             too if they are this close: only features that share a vertex are left out.
         stream : Stream, optional
-            As for :meth:`detect`.
 
         Returns
         -------
         Proximity or DeviceProximity
             "exact" and "conservative": exactly the pairs of rational arithmetic; distances within 1e-12 of the
             scene's size.
-
-        Raises
-        ------
-        TypeError, ValueError
-            As :meth:`detect` raises.
         """
         distance = arguments.length("distance", distance)
         found = self._ask("proximity", vertices, stream, distance)
@@ -61,20 +54,13 @@ class SnapshotQueries(Generic[ProximityResult, IntersectionsResult, DistancesRes
 
         Parameters
         ----------
-        vertices : Positions
-            As for :meth:`detect`; coordinates up to 1e300.
+        vertices : Positions, shape (V, 3)
         stream : Stream, optional
-            As for :meth:`detect`.
 
         Returns
         -------
         Intersections or DeviceIntersections
             Decided as by rational arithmetic, at every accuracy.
-
-        Raises
-        ------
-        TypeError, ValueError
-            As :meth:`detect` raises.
         """
         found = self._ask("intersections", vertices, stream)
         on_device = self.results == "device"
@@ -87,20 +73,13 @@ class SnapshotQueries(Generic[ProximityResult, IntersectionsResult, DistancesRes
 
         Parameters
         ----------
-        vertices : Positions
-            As for :meth:`detect`; coordinates up to 1e300.
+        vertices : Positions, shape (V, 3)
         stream : Stream, optional
-            As for :meth:`detect`.
 
         Returns
         -------
         list of Gap, or list of W such lists with worlds
             A Gap for each pair, in the order in which the meshes were added: (0, 0), (0, 1), ...
-
-        Raises
-        ------
-        TypeError, ValueError
-            As :meth:`detect` raises.
 
         Notes
         -----

@@ -214,8 +214,43 @@ py::tuple run_queries(const Array<double>& queries, Accuracy accuracy, Simd simd
 }  // namespace
 
 PYBIND11_MODULE(_core, m) {
-  py::register_exception<InvalidArgument>(m, "InvalidArgument", PyExc_ValueError);
-  py::register_exception<Cancelled>(m, "Cancelled", PyExc_RuntimeError);
+  py::register_exception<InvalidArgument>(m, "InvalidArgument", PyExc_ValueError).doc() =
+      R"(An argument that the compiled core rejects: a :class:`ValueError`.
+
+The message begins with the name of the argument and ends with the remedy. The scene or the detector stays usable.
+
+Notes
+-----
+Arguments are checked in Python first, which raises a plain ValueError or TypeError. Catch ValueError for both.
+
+Examples
+--------
+>>> import hpccd_core as hc
+>>> scene = hc.Scene()
+>>> _ = scene.add_mesh("cloth", [[0, 1, 2]])
+>>> _ = scene.add_mesh("cloth", [[0, 1, 2]])
+Traceback (most recent call last):
+...
+hpccd_core._core.InvalidArgument: name: a mesh named 'cloth' is already in the scene; choose another
+)";
+  py::register_exception<Cancelled>(m, "Cancelled", PyExc_RuntimeError).doc() =
+      R"(The detector was cancelled: a :class:`RuntimeError`.
+
+The call in progress, those that wait for it and all later queries of the detector raise it after
+:meth:`Detector.cancel`. Make another Detector to go on.
+
+Examples
+--------
+>>> import hpccd_core as hc
+>>> scene = hc.Scene()
+>>> _ = scene.add_mesh("cloth", [[0, 1, 2]])
+>>> detector = hc.Detector(scene)
+>>> detector.cancel()
+>>> detector.detect([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0.0, 0, 1], [1, 0, 1], [0, 1, 1]])
+Traceback (most recent call last):
+...
+hpccd_core._core.Cancelled: the detection was cancelled
+)";
   py::enum_<Accuracy>(m, "Accuracy")
       .value("fast", Accuracy::fast)
       .value("balanced", Accuracy::balanced)

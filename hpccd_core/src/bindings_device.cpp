@@ -143,10 +143,42 @@ py::array to_host(const DeviceArray& a) {
 }  // namespace
 
 void bind_device_array(py::module_& m) {
-  py::class_<DeviceArray>(m, "DeviceArray")
-      .def_property_readonly("shape", [](const DeviceArray& a) { return py::tuple(py::cast(a.shape)); })
-      .def_property_readonly("dtype", [](const DeviceArray& a) { return py::dtype(a.type()); })
-      .def_property_readonly("device", [](const DeviceArray& a) { return a.device; })
+  py::class_<DeviceArray>(m, "DeviceArray", R"(A C-contiguous array in a GPU's memory, which results hold.
+
+CuPy, PyTorch, Numba and Warp take it in place, by CUDA array interface or DLPack. Arrays made of it keep its memory
+alive. Its contents are complete when a query returns.
+
+Attributes
+----------
+shape : tuple of int
+dtype : numpy.dtype
+    uint32, int64, uint64 or float64.
+device : int
+    Number of the GPU in CUDA.
+
+Raises
+------
+TypeError
+    By ``numpy.asarray``, which cannot read this memory; :meth:`to_host` gives a copy. Also by ``DeviceArray()``:
+    results of a Detector with results="device" hold them.
+BufferError
+    By ``__dlpack__``, if a copy or another device is requested.
+
+Examples
+--------
+With a GPU and CuPy::
+
+    contacts = hc.Detector(scene, results="device").detect(vertices_t0, vertices_t1)
+    vf = cupy.asarray(contacts.vf)               # in place
+    toc = torch.from_dlpack(contacts.vf_toc)     # in place
+    ee = contacts.ee.to_host()                   # a numpy array
+)")
+      .def_property_readonly(
+          "shape", [](const DeviceArray& a) { return py::tuple(py::cast(a.shape)); }, "Number of elements by axis.")
+      .def_property_readonly(
+          "dtype", [](const DeviceArray& a) { return py::dtype(a.type()); }, "numpy.dtype of the elements.")
+      .def_property_readonly(
+          "device", [](const DeviceArray& a) { return a.device; }, "Number of the GPU in CUDA.")
       .def("__len__", [](const DeviceArray& a) { return a.shape[0]; })
       .def_property_readonly("__cuda_array_interface__", &interface_of)
       .def("__array__", &refuse_numpy, py::arg("dtype") = py::none(), py::arg("copy") = py::none())
@@ -163,11 +195,64 @@ void bind_device_array(py::module_& m) {
           },
           py::kw_only(), py::arg("stream") = py::none(), py::arg("max_version") = py::none(),
           py::arg("dl_device") = py::none(), py::arg("copy") = py::none())
-      .def("rows", &rows_of, py::arg("begin"), py::arg("end"))
+      .def("rows", &rows_of, py::arg("begin"), py::arg("end"),
+           R"(Rows [begin, end), in place.
+
+Parameters
+----------
+begin, end : int
+    0 <= begin <= end <= len(self).
+
+Returns
+-------
+DeviceArray
+
+Raises
+------
+IndexError
+    If the rows are out of range.
+)")
       .def(
-          "seen_as", [](DeviceArray a, char kind) { return a.kind = kind, a; }, py::arg("kind"))
-      .def("joined", &joined, py::arg("other"))
-      .def("to_host", &to_host)
+          "seen_as", [](DeviceArray a, char kind) { return a.kind = kind, a; }, py::arg("kind"),
+          R"(The same memory read as another kind of number of the same size.
+
+Parameters
+----------
+kind : {"u", "i", "f"}
+    Unsigned, signed or floating point.
+
+Returns
+-------
+DeviceArray
+)")
+      .def("joined", &joined, py::arg("other"), R"(A copy of the rows of this array, then of another one.
+
+Parameters
+----------
+other : DeviceArray
+    Of the same dtype, row shape and device, which is not checked.
+
+Returns
+-------
+DeviceArray
+
+Raises
+------
+RuntimeError
+    If the GPU fails.
+)")
+      .def("to_host", &to_host, R"(A copy as a numpy array; waits for it.
+
+Returns
+-------
+ndarray
+    Of the same shape and dtype.
+
+Raises
+------
+RuntimeError
+    If the GPU fails.
+)")
       .def("__repr__", [](const DeviceArray& a) {
         return "DeviceArray(shape=" + std::string(py::str(py::tuple(py::cast(a.shape)))) +
                ", dtype=" + std::string(py::str(py::dtype(a.type()))) + ", device=" + std::to_string(a.device) + ")";

@@ -23,8 +23,11 @@ _MOST_BYTES = 4 * MOST_CHARACTERS
 def text_of(resource: str) -> str:
     """The text of a file: a path, package:// or file://. Raises RobotError."""
     try:
-        with open(path_of(resource), "rb") as file:
+        with open(path := path_of(resource), "rb") as file:
             data = file.read(_MOST_BYTES + 1)
+    except FileNotFoundError as error:
+        remedy = "correct the path" + ("" if path.is_absolute() else f", which starts at {Path.cwd()}")
+        raise RobotError(f"{shortened(resource)}: no such file; {remedy}") from error
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise RobotError(f"{shortened(resource)}: cannot be read: {why}") from error

@@ -12,7 +12,7 @@ from itertools import product
 from typing import Any
 
 from hpccd_core.options import ACCURACIES, FEATURES
-from hpccd_ros.base.quoting import listed, quoted
+from hpccd_ros.base.quoting import listed, quoted, suggestion
 from hpccd_ros.detect.separation import Separation
 from hpccd_ros.params.table import FARTHEST, PAIRS
 from hpccd_ros.params.values import ParameterError
@@ -51,6 +51,7 @@ def ignored_pairs(
         if not _are_names(settings, pair) or (pair[0] == pair[1] and pair[0] not in settings["robots"]):
             raise ParameterError(
                 f"ignored_pairs: {quoted(text)} must be NAME:NAME with two different meshes out of {_names(settings)}"
+                f"{_meant(settings, pair)}"
             )
         given.append(_PairSetting("ignored_pairs", text, pair, True))
     for one in _structured(settings, "ignored"):
@@ -79,7 +80,7 @@ def pair_accuracies(settings: dict[str, Any], links: Links = NO_LINKS) -> tuple[
         if not _are_names(settings, names) or tier not in ACCURACIES:
             raise ParameterError(
                 f"pair_accuracy: {quoted(text)} must be NAME:NAME:TIER with meshes out of {_names(settings)} "
-                f"and a tier out of {', '.join(ACCURACIES)}"
+                f"and a tier out of {', '.join(ACCURACIES)}{_meant(settings, names)}"
             )
         given.append(_PairSetting("pair_accuracy", text, tuple(names), tier))
     agreed = _agreed([*given, *_structured(settings, "accuracy")])
@@ -95,7 +96,7 @@ def pair_features(settings: dict[str, Any], links: Links = NO_LINKS) -> tuple[tu
         if not _are_names(settings, names) or kind not in FEATURES:
             raise ParameterError(
                 f"pair_features: {quoted(text)} must be NAME:NAME:KIND with meshes out of {_names(settings)} "
-                f"and a kind out of {', '.join(FEATURES)}"
+                f"and a kind out of {', '.join(FEATURES)}{_meant(settings, names)}"
             )
         texts, _, kinds = listed_kinds.setdefault(frozenset(names), ([], tuple(names), set()))
         texts.append(text)
@@ -117,7 +118,7 @@ def separation(settings: dict[str, Any], links: Links = NO_LINKS) -> Separation:
         if not _are_names(settings, names) or distance is None:
             raise ParameterError(
                 f"pair_separation: {quoted(text)} must be NAME:NAME:DISTANCE with meshes out of {_names(settings)} "
-                f"and a distance from 0 to {FARTHEST:g}"
+                f"and a distance from 0 to {FARTHEST:g}{_meant(settings, names)}"
             )
         given.append(_PairSetting("pair_separation", text, tuple(names), distance))
     agreed = _agreed([*given, *_structured(settings, "separation")])
@@ -140,7 +141,7 @@ def _structured(settings: dict[str, Any], key: str) -> Iterator[_PairSetting]:
         if not _are_names(settings, names):
             raise ParameterError(
                 f"{PAIRS}.{pair}.meshes: {quoted(names)} must be two names out of {_names(settings)}; the same name "
-                "twice means within this mesh"
+                f"twice means within this mesh{_meant(settings, names)}"
             )
         value = of[key]
         if value is not None and value not in ("", []):
@@ -210,10 +211,17 @@ def _meshes(name: str, given: _PairSetting, settings: dict[str, Any], links: Lin
 
 def _are_names(settings: dict[str, Any], names: Sequence[str]) -> bool:
     """Whether they are two names of meshes, robots or their links."""
-    return len(names) == 2 and all(
-        name in settings["meshes"] or (name.partition("/")[0] in settings["robots"] and not name.endswith("/"))
-        for name in names
-    )
+    return len(names) == 2 and all(_is_name(settings, name) for name in names)
+
+
+def _is_name(settings: dict[str, Any], name: str) -> bool:
+    return name in settings["meshes"] or (name.partition("/")[0] in settings["robots"] and not name.endswith("/"))
+
+
+def _meant(settings: dict[str, Any], names: Sequence[str]) -> str:
+    """The end of a message: the name that is spelled most like the first unknown one."""
+    unknown = next((name for name in names if not _is_name(settings, name)), None)
+    return "" if unknown is None else suggestion(unknown, [*settings["meshes"], *settings["robots"]])
 
 
 def _names(settings: dict[str, Any]) -> str:

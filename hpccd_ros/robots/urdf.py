@@ -272,12 +272,14 @@ def _numbers(
     text = element.attributes.get(attribute)
     if text is None and default is not None:
         return default
+    needed = "a finite number" if count == 1 else f"{count} finite numbers with spaces between"
+    if not (text or "").strip():
+        raise element.error(f"has no {attribute}; add the attribute with {needed}")
     try:
         found = tuple(float(word) for word in element.text(attribute).split())
     except ValueError:
         found = ()
     if len(found) != count or not all(math.isfinite(number) for number in found):
-        needed = "a finite number" if count == 1 else f"{count} finite numbers with spaces between"
         raise element.error(f"has {attribute}={quoted(text or '')}; it must be {needed}")
     return found
 

@@ -24,6 +24,18 @@ def test_examples_run(name):
     assert found.failed == 0
 
 
+@pytest.mark.parametrize("name", ["Cancelled", "DeviceArray", "InvalidArgument"])
+def test_what_is_compiled_is_documented_too(name):
+    doc = inspect.getdoc(PUBLIC[name])
+    assert "Examples\n--------\n" in doc
+    if name != "DeviceArray":  # whose examples need a GPU
+        example = doctest.DocTestParser().get_doctest(doc, {}, name, None, 0)
+        assert example.examples and doctest.DocTestRunner().run(example).failed == 0
+    else:
+        methods = {k: v.__doc__ for k, v in vars(PUBLIC[name]).items() if not k.startswith("_")}
+        assert all(methods.values()) and "Raises\n------\nIndexError" in methods["rows"]
+
+
 def test_the_examples_are_found():
     tests = [t for name in MODULES for t in doctest.DocTestFinder().find(importlib.import_module(name)) if t.examples]
     assert {"Detector", "Scene", "Contacts", "icosphere"} <= {t.name.rpartition(".")[2] for t in tests}
@@ -56,6 +68,8 @@ def test_help_of_the_detector_is_short():
     assert len(summary.splitlines()) <= 100 and max(map(len, summary.splitlines())) <= 120
     text = pydoc.render_doc(hc.Detector, renderer=pydoc.plaintext)
     assert "Union[" not in text and "_NestedSequence" not in text
+    assert len(text.splitlines()) <= 325 and max(map(len, text.splitlines())) < 300
+    assert "Detector(scene, *, accuracy='exact', backend='auto'" in text
     assert "detect(self, vertices_t0: 'Positions', vertices_t1: 'Positions', stream: 'Stream' = None)" in text
     options = list(inspect.signature(hc.Detector).parameters)
     listed = {word for line in re.findall(r"^(\w[\w, ]*) : ", summary, re.M) for word in line.split(", ")}

@@ -4,6 +4,7 @@
 import pytest
 
 from hpccd_ros.middleware import robot_files
+from hpccd_ros.robots.errors import RobotError
 
 
 @pytest.mark.parametrize(
@@ -20,3 +21,11 @@ def test_relative_mesh_files_lie_beside_the_description_however_it_is_named(tmp_
     values = {"geometry": "collision", "tolerance": 1e-3}
     robot = robot_files.robot_of("arm", values, robot_files.text_of(path), None, robot_files.resolver(path))
     assert [len(mesh.topology.faces) for mesh in robot.meshes] == [1]
+
+
+def test_a_missing_file_is_named_with_where_a_relative_path_starts(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(RobotError, match=f"^arm.urdf: no such file; correct the path, which starts at {tmp_path}$"):
+        robot_files.text_of("arm.urdf")
+    with pytest.raises(RobotError, match="/arm.urdf: no such file; correct the path$"):
+        robot_files.text_of(f"{tmp_path}/arm.urdf")

@@ -297,7 +297,7 @@ def test_another_description_makes_another_scene(start_node):
 
 def test_a_file_that_cannot_be_used_ends_the_start(start_node, tmp_path):
     file = tmp_path / "crane.urdf"
-    for text, why in ((None, "No such file"), ("<robot/>", "has no <link>")):
+    for text, why in ((None, "no such file; correct the path"), ("<robot/>", "has no <link>")):
         if text is not None:
             file.write_text(text)
         node = start_node({**parameters(**{**JOINTS, "description": str(file)}), "autostart": False}, wait=False)

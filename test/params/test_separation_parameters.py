@@ -39,6 +39,7 @@ def test_markers_show_nearest_points_only_where_something_is_to_stay_apart():
         ({"minimum_separation": math.inf}, "minimum_separation: inf is outside"),
         ({"minimum_separation": 10**400}, "is of the wrong type; expected float"),
         ({"minimum_separation": True}, "minimum_separation: True is of the wrong type; expected float"),
+        ({"pair_separation": ["robto:cloth:0.1"]}, "; did you mean robot?"),
         ({"pair_separation": ["robot:cloth"]}, "pair_separation: 'robot:cloth' must be NAME:NAME:DISTANCE"),
         ({"pair_separation": ["robot:cloth:near"]}, "'robot:cloth:near' must be NAME:NAME:DISTANCE"),
         ({"pair_separation": ["robot:cloth:0.1:x"]}, "'robot:cloth:0.1:x' must be NAME:NAME:DISTANCE"),
