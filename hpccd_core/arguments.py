@@ -283,8 +283,9 @@ def vertices(name: str, value: object, shape: tuple[int, ...], layout: MeshLayou
     A mapping holds the array of each mesh by its name.
     """
     if type(value) is not np.ndarray and isinstance(value, Mapping):
-        return _of_meshes(name, value, shape, layout)
-    array = _reals(name, _array(name, value), value)
+        array = _of_meshes(name, value, shape, layout)
+    else:
+        array = _reals(name, _array(name, value), value)
     if array.shape != shape:
         raise ValueError(
             f"{name}: expected shape {shape}, {'for each world ' if len(shape) > 2 else ''}one row a vertex of the "

@@ -242,6 +242,8 @@ class Scene:
         if (vertex is None) == (face is None):
             raise TypeError("locate: give vertex or face, one of both")
         name, value, total = ("vertex", vertex, self.n_vertices) if face is None else ("face", face, self.n_faces)
+        if total == 0 and np.size(value):
+            raise ValueError(f"{name}: the scene has no {name}; add_mesh comes first")
         offsets = self.layout.vertex_offsets if face is None else self.layout.face_offsets
         if not isinstance(value, (np.ndarray, list, tuple)) or np.ndim(value) == 0:
             index = arguments.whole_number(name, value, 0, total - 1)

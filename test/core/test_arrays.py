@@ -9,6 +9,7 @@ import pytest
 import random_scenes
 
 import hpccd_core as hc
+from hpccd_core import shapes
 
 
 @pytest.fixture
@@ -22,9 +23,9 @@ def expected(meshes):
 
 
 def _strided(array):
-    wide = np.full((2 * len(array), 5), np.nan)
-    wide[::2, 1:4] = array
-    return wide[::2, 1:4]
+    wide = np.full((2 * len(array), *array.shape[1:-1], 5), np.nan)
+    wide[::2, ..., 1:4] = array
+    return wide[::2, ..., 1:4]
 
 
 def _misaligned(array):
@@ -55,6 +56,29 @@ LAYOUTS = [
 def test_layout_changes_nothing(meshes, expected, layout):
     contacts = hc.Detector(meshes.scene()).detect(layout(meshes.vertices_t0), layout(meshes.vertices_t1))
     assert contacts.hash == expected
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("worlds", [None, 2])
+def test_layout_changes_nothing_mesh_by_mesh(layout, worlds):
+    """Positions as a dict: numpy concatenates arrays in Fortran order to one in Fortran order."""
+    random = np.random.default_rng(5)
+    vertices, faces = shapes.icosphere(1)
+    scene = hc.Scene()
+    for name in ("left", "right"):
+        scene.add_mesh(name, faces)
+    copies = 1 if worlds is None else worlds
+    ends = random.uniform(-1, 1, (2, copies, 2 * len(vertices), 3))
+    start, end = ends[:, 0] if worlds is None else ends
+    detector = hc.Detector(scene, worlds=worlds)
+
+    def by_mesh(positions):
+        of_left, of_right = np.split(positions, 2, axis=-2)
+        return {"right": layout(of_right), "left": layout(of_left)}
+
+    truth = detector.detect(start, end)
+    assert len(truth) > 100 and detector.detect(by_mesh(start), by_mesh(end)) == truth
+    assert detector.proximity(by_mesh(start), 0.05) == detector.proximity(start, 0.05)
 
 
 @pytest.mark.parametrize("dtype", [np.int8, np.uint8, np.int16, np.int32, np.uint32, np.int64, np.uint64, ">i4"])
