@@ -37,12 +37,18 @@ struct GivenPositions {
 
   using Stream = std::optional<std::uintptr_t>;
   explicit GivenPositions(const py::array& a, Stream made_on = std::nullopt)
-      : positions{a.data(), static_cast<std::size_t>(a.size()) / 3, py::isinstance<py::array_t<double>>(a)} {
+      : positions{in_order(a).data(), static_cast<std::size_t>(a.size()) / 3, py::isinstance<py::array_t<double>>(a)} {
     if (made_on) positions.made_on = reinterpret_cast<void*>(*made_on);
   }
   GivenPositions(std::uintptr_t pointer, std::size_t n, bool is_double, Stream made_on)
       : positions{reinterpret_cast<const void*>(pointer), n, is_double, true} {
     if (made_on) positions.made_on = reinterpret_cast<void*>(*made_on);
+  }
+
+ private:
+  static const py::array& in_order(const py::array& a) {
+    if ((a.flags() & py::array::c_style) == 0) throw py::value_error("positions: must be C-contiguous");
+    return a;
   }
 };
 

@@ -81,6 +81,12 @@ def test_layout_changes_nothing_mesh_by_mesh(layout, worlds):
     assert detector.proximity(by_mesh(start), 0.05) == detector.proximity(start, 0.05)
 
 
+def test_the_core_itself_takes_only_rows(meshes):
+    start, end = np.asfortranarray(meshes.vertices_t0), np.ascontiguousarray(meshes.vertices_t1)
+    with pytest.raises(ValueError, match="must be C-contiguous"):
+        hc.Detector(meshes.scene())._core.detect(start, end)
+
+
 @pytest.mark.parametrize("dtype", [np.int8, np.uint8, np.int16, np.int32, np.uint32, np.int64, np.uint64, ">i4"])
 def test_dtype_of_faces_changes_nothing(meshes, expected, dtype):
     scene = hc.Scene()

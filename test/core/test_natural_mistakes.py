@@ -121,7 +121,10 @@ MISTAKES = {
         lambda: hc.Detector(one_based()).detect(CLOTH, CLOTH),
         r"got \(9, 3\); one row is missing: from faces that count vertices from 1, subtract 1",
     ),
-    "an index in an empty scene": (lambda: hc.Scene().locate(0), "vertex: the scene has no vertex; add_mesh comes first"),
+    "an index in an empty scene": (
+        lambda: hc.Scene().locate(0),
+        "vertex: the scene has no vertex; add_mesh comes first",
+    ),
     "an index beyond": (lambda: scene().locate(21), r"vertex: must lie in \[0, 20\], got 21"),
 }
 
