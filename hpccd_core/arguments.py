@@ -97,7 +97,7 @@ def mesh_number(name: str, mesh: str | int, numbers: Mapping[str, int]) -> int:
             raise ValueError(f"{name}: no mesh is named {mesh!r}; the scene has {there}{did_you_mean(mesh, numbers)}")
         return numbers[mesh]
     if not numbers:
-        raise ValueError(f"{name}: the scene has no mesh yet; add_mesh comes first")
+        raise ValueError(f"{name}: the scene has no mesh yet; call add_mesh first")
     return whole_number(name, mesh, 0, len(numbers) - 1)
 
 
@@ -254,8 +254,8 @@ def feature_names(value: Iterable[str]) -> tuple[str, ...]:
     names = _names("features", value, FEATURES)
     if not names:
         raise ValueError(
-            f"features: none is named, so nothing would be tested; use {' or '.join(FEATURES)}, or both; meshes that "
-            "shall not be tested at all are left out by scene.ignore_pair"
+            f"features: empty, so nothing would be tested; use {' or '.join(FEATURES)}, or both; to leave out "
+            "a pair of meshes, use scene.ignore_pair"
         )
     return tuple(name for name in FEATURES if name in names)
 

@@ -200,7 +200,7 @@ class Detector(
     ) -> None:
         if not isinstance(scene, Scene):
             raise TypeError(
-                f"scene: expected hpccd_core.Scene, got {type(scene).__name__}; make one with Scene() and add_mesh()"
+                f"scene: expected hpccd_core.Scene, got {type(scene).__name__}; create one with Scene() and add_mesh()"
             )
         if unnamed:
             raise TypeError(
@@ -233,7 +233,7 @@ class Detector(
         hybrid_segment_pairs = arguments.whole_number("hybrid_segment_pairs", hybrid_segment_pairs, 1, 1 << 20)
         gpus = arguments.whole_number("gpus", gpus, 0, 1024)
         if gpus > (here := len(gpu_status()["devices"])) and backend in ("hybrid", "auto"):
-            raise ValueError(f"gpus: {gpus} were asked for, {here} are usable here; give at most {here}, or 0 for all")
+            raise ValueError(f"gpus: {gpus} requested, {here} are usable here; give at most {here}, or 0 for all")
         minimum_separation = arguments.length("minimum_separation", minimum_separation)
         self.worlds = None if worlds is None else arguments.whole_number("worlds", worlds, 1, _core.MOST_WORLDS)
         self.n_vertices = scene.n_vertices

@@ -122,7 +122,7 @@ def _from_interface(name: str, interface: Any) -> _Layout:
         strides = None if strides is None else tuple(strides)
         place = tuple(interface["shape"]), strides, interface["typestr"], interface["data"][0]
     except (AttributeError, IndexError, KeyError, TypeError) as error:
-        raise TypeError(f"{name}: its __cuda_array_interface__ is not as the protocol has it ({error!r})") from None
+        raise TypeError(f"{name}: its __cuda_array_interface__ does not follow the protocol ({error!r})") from None
     if mask is not None:
         raise TypeError(f"{name}: has a mask, and every element is needed; give an array without one")
     return place
@@ -174,7 +174,7 @@ def _from_dlpack(name: str, value: Any, stream: int | None) -> _Layout:
     try:
         capsule = value.__dlpack__(stream=stream or 1)
     except Exception as error:
-        raise TypeError(f"{name}: {type(value).__name__} is not given out by DLPack ({error})") from error
+        raise TypeError(f"{name}: {type(value).__name__} cannot be exported by DLPack ({error})") from error
     get = ctypes.pythonapi.PyCapsule_GetPointer
     get.restype, get.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
     tensor = ctypes.cast(get(capsule, b"dltensor"), ctypes.POINTER(_Tensor)).contents

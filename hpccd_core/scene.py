@@ -240,7 +240,7 @@ class Scene:
         (('b', 0), ('b', 1))
         """
         if (vertex is None) == (face is None):
-            raise TypeError("locate: give vertex or face, one of both")
+            raise TypeError("locate: give either vertex or face")
         name, value, total = ("vertex", vertex, self.n_vertices) if face is None else ("face", face, self.n_faces)
         if total == 0 and np.size(value):
             raise ValueError(f"{name}: the scene has no {name}; add_mesh comes first")

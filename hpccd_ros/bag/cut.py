@@ -165,7 +165,7 @@ def _limits(recording, first, begin, end, watch) -> tuple[int, int]:
                 )
         start, stop = found[0] or start, found[1] or stop
     if start > stop and begin is not None and end is not None:
-        raise RecordingError(f"{recording.path}: the part would end before it begins; exchange --from and --to")
+        raise RecordingError(f"{recording.path}: the part would end before it begins; swap --from and --to")
     return start, stop
 
 

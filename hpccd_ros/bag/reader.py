@@ -216,7 +216,7 @@ def recording_files(path: Path) -> list[Path]:
             raise RecordingError(f"{file} does not exist")
         # A pipe, device or socket may never return data, and cannot be read twice.
         if not file.is_file():
-            raise RecordingError(f"{file} is no file that can be read again: copy the recording into one")
+            raise RecordingError(f"{file} is not a regular file: copy the recording into one")
         _check_format(file)
     return files
 

@@ -108,7 +108,7 @@ def parse(text: str) -> list[Bound]:
         if quantity not in QUANTITIES:
             raise UserError(f"--choose {word!r}: {quantity} is not known; choose from {', '.join(QUANTITIES)}")
         if quantity in bounds:
-            raise UserError(f"--choose: {quantity} is bounded twice; keep one of both")
+            raise UserError(f"--choose: {quantity} is bounded twice; keep one bound")
         try:
             limit = float(number)
         except ValueError:

@@ -182,7 +182,7 @@ def scene_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
     if contacts.mesh_names != layout.mesh_names:
         raise ValueError(
             f"layout: it is of the meshes {', '.join(layout.mesh_names)}, the message of "
-            f"{', '.join(contacts.mesh_names)}; make it of these, in this order"
+            f"{', '.join(contacts.mesh_names)}; create it from these, in this order"
         )
     return contact_messages.read_contacts(message, layout)
 
@@ -227,7 +227,7 @@ def pair_summary(message: PairSummaryArray, mesh_a: str, mesh_b: str) -> PairSum
     if not found:
         there = ", ".join(f"{pair.mesh_a} and {pair.mesh_b}" for pair in message.pairs)
         raise ValueError(
-            f"mesh_a, mesh_b: {mesh_a!r} and {mesh_b!r} are no pair that is tested; the tested pairs are {there}"
+            f"mesh_a, mesh_b: {mesh_a!r} and {mesh_b!r} are not a tested pair; the tested pairs are {there}"
         )
     if len(found) == 1 and {found[0].mesh_a, found[0].mesh_b} == {mesh_a, mesh_b}:
         return found[0]

@@ -64,7 +64,7 @@ def collision_free_step_request(
     versions = dict.fromkeys(names, 0)
     if topologies is not None:
         if topology_versions is not None:
-            raise ValueError("topology_versions: the topologies that are sent have theirs; give one of both")
+            raise ValueError("topology_versions: the topologies have their own versions; give only one of the two")
         _check_meshes("topologies", topologies, names)
         versions = {name: topologies[name].version for name in names}
     elif topology_versions is not None:

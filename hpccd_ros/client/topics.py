@@ -166,5 +166,5 @@ def _mesh_name(mesh: str) -> str:
     if not isinstance(mesh, str):
         raise TypeError(f"mesh: expected its name, got {type(mesh).__name__}")
     if not topic_names.MESH_NAME.fullmatch(mesh):
-        raise ValueError(f"mesh: {quoted(mesh)} can be no name of a mesh; use letters, digits and _, a letter first")
+        raise ValueError(f"mesh: {quoted(mesh)} is not a valid mesh name; use letters, digits and _, a letter first")
     return mesh

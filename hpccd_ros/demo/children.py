@@ -70,7 +70,7 @@ class Children:
         for child in self._all:
             if not child.running and child.process.returncode != 0:
                 raise UserError(
-                    f"the {child.name} ended with status {child.process.returncode}; its last words ({child.log}):\n"
+                    f"the {child.name} ended with status {child.process.returncode}; its last output ({child.log}):\n"
                     f"{child.last_words()}"
                 )
 

@@ -70,7 +70,7 @@ class FrameAssembler:
     def __init__(self, meshes: Sequence[MeshSettings], rules: AssemblyRules, following: Collection[str] = ()) -> None:
         deforming = [m.name for m in meshes if not m.static]
         if not deforming:
-            raise ValueError("meshes: at least one mesh must not be static, or nothing ever moves")
+            raise ValueError("meshes: at least one mesh must not be static, otherwise nothing moves")
         if len({m.name for m in meshes}) != len(meshes):
             raise ValueError(f"meshes: names must differ, got {[m.name for m in meshes]}")
         self._meshes = {m.name: _MeshState(m, rules.max_pending) for m in meshes}

@@ -157,7 +157,7 @@ def read_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
     Raises ValueError where the message belongs to other versions of the topologies than the layout.
     """
     if why := other_topologies(message, layout):
-        raise ValueError(f"layout: {why}; make it of the topologies of these versions")
+        raise ValueError(f"layout: {why}; create it from the topologies of these versions")
     pairs = read_pairs(message, layout)
     toc, distance = np.frombuffer(message.toc, np.float64), np.frombuffer(message.distance, np.float64)
     n_vf = len(pairs.vf)

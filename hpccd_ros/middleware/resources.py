@@ -44,6 +44,6 @@ def _in_package(resource: str, package: str, path: str) -> str:
         return str(Path(get_package_share_directory(package)) / path)
     except PackageNotFoundError as error:
         raise MeshFileError(
-            f"{shown}: no package {quoted(package)} is installed (AMENT_PREFIX_PATH names where it is looked for); "
+            f"{shown}: no package {quoted(package)} is installed (AMENT_PREFIX_PATH lists the searched folders); "
             "install it and source its workspace, or give a path"
         ) from error

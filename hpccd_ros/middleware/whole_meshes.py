@@ -79,7 +79,8 @@ def mesh_from_shape(data: bytes, sent: int, max_vertices: int, max_faces: int) -
     time than the node. Raises InvalidMessageError: empty, too large, an index out of range, an invalid coordinate."""
     if sent <= 0:
         raise InvalidMessageError(
-            Reason.MALFORMED, "its publisher tells no time of sending, the only stamp there is; use another input"
+            Reason.MALFORMED,
+            "its publisher sends no source timestamp, its only stamp; use another input",
         )
     reader = CdrReader(data)
     faces = reader.numbers("u4", 3 * _size("triangles", reader, "max_faces", max_faces)).reshape(-1, 3)
@@ -104,7 +105,7 @@ def mesh_from_marker(data: bytes, max_vertices: int, max_faces: int, welding: We
     if action != Marker.ADD:
         raise InvalidMessageError(
             Reason.UNSUPPORTED_TYPE,
-            f"marker with action {_ACTIONS.get(action, action)}: a mesh cannot be taken away; only ADD is understood",
+            f"marker with action {_ACTIONS.get(action, action)}: a mesh cannot be removed; only ADD is supported",
         )
     if kind != Marker.TRIANGLE_LIST:
         raise InvalidMessageError(
@@ -114,7 +115,7 @@ def mesh_from_marker(data: bytes, max_vertices: int, max_faces: int, welding: We
     if not (np.isfinite(scale).all() and scale.all()):
         raise InvalidMessageError(
             Reason.MALFORMED,
-            f"scale is {scale.tolist()}; it multiplies the points: set 1 where they are not to be scaled",
+            f"scale is {scale.tolist()}; it multiplies the points: set 1 to leave them unscaled",
         )
     try:
         pose = Rigid.of(shift, turn)

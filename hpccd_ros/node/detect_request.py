@@ -109,7 +109,7 @@ def _names(request: Request, scene: NodeScene, most: int) -> list[str]:
             f"mesh_names: {counted(len(names), 'mesh', 'meshes')}, at most {most} are taken (parameter max_meshes)"
         )
     if len(set(names)) != len(names):
-        raise RequestError(f"mesh_names: names must differ, {repeated(names)} is there twice")
+        raise RequestError(f"mesh_names: names must differ, {repeated(names)} occurs twice")
     return names
 
 

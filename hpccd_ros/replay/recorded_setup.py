@@ -85,7 +85,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         if not settings["meshes"] and not settings["robots"]:
             raise ParameterError("parameter `meshes` names no mesh, and `robots` no robot")
         if not settings["robots"] and all(row["static"] for row in meshes.values()):
-            raise ParameterError("at least one mesh must not be static, or nothing ever moves")
+            raise ParameterError("at least one mesh must not be static, otherwise nothing moves")
         scene_parameters.check(settings, meshes)
         without_effect = values.unknown(given, meshes, settings["robots"])
         if parameter_file:  # what is stored may be of another version

@@ -65,12 +65,12 @@ def test_what_is_no_file_is_rejected_at_once(tmp_path):
             if path.is_dir() and "--recover" in command:
                 continue
             done = hpccd(*command)
-            assert done.status == 2 and "is no file that can be read again" in done.err and not done.traceback, done
+            assert done.status == 2 and "is not a regular file" in done.err and not done.traceback, done
 
 
 def test_a_folder_in_place_of_a_file(tmp_path, small_bag):
     (tmp_path / "run" / "run_0.mcap").mkdir(parents=True)
-    assert "is no file" in hpccd("replay", tmp_path / "run").err
+    assert "is not a regular file" in hpccd("replay", tmp_path / "run").err
     # Digits, but no number.
     shutil.copy(small_bag, tmp_path / "run_².mcap")
     shutil.rmtree(tmp_path / "run")

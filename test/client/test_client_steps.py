@@ -45,7 +45,7 @@ def test_what_the_node_knows_is_left_out():
         (dict(start={"a": TRIANGLE, "b": [[0.0]]}), TypeError, r"start\['b'\]: vertices: expected an array"),
         (dict(end={"a": TRIANGLE * math.nan, "b": TRIANGLE}), ValueError, r"end\['a'\]: vertices: vertex 0 is"),
         (dict(topologies={"a": TOPOLOGIES["a"]}), ValueError, "topologies: of meshes a, start is of a, b"),
-        (dict(topologies=TOPOLOGIES, topology_versions={"a": 1}), ValueError, "topology_versions: the topologies that"),
+        (dict(topologies=TOPOLOGIES, topology_versions={"a": 1}), ValueError, "topology_versions: the topologies have"),
         (dict(topology_versions={"c": 1}), ValueError, "topology_versions: start has no mesh c"),
         (dict(topology_versions={"a": -1}), ValueError, r"start\['a'\]: topology_version: must lie in"),
         (dict(accuracy="sloppy"), ValueError, "accuracy: 'sloppy' is not known; use one of fast"),

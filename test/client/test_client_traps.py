@@ -106,7 +106,7 @@ def test_summaries_of_whole_robots(names, expected):
     [
         (("arm", "cloht"), "mesh_b: no mesh is named 'cloht'; there are .*did you mean 'cloth'"),
         (("Arm", "cloth"), "mesh_a: no mesh is named 'Arm'.*did you mean 'arm'"),
-        (("arms", "table"), "'arms' and 'table' are no pair that is tested; the tested pairs are arm/hand and cloth"),
+        (("arms", "table"), "'arms' and 'table' are not a tested pair; the tested pairs are arm/hand and cloth"),
         (("ar", "cloth"), "mesh_a: no mesh is named 'ar'"),
     ],
 )

@@ -197,7 +197,7 @@ def test_names_in_any_form():
 @pytest.mark.parametrize(
     "features, error, text",
     [
-        ((), ValueError, "features: none is named.*use vertex_face or edge_edge, or both.*scene.ignore_pair"),
+        ((), ValueError, "features: empty.*use vertex_face or edge_edge, or both.*scene.ignore_pair"),
         ("vertex-face", ValueError, "features: 'vertex-face' is not known; use one of vertex_face, edge_edge"),
         ("", ValueError, "features: '' is not known"),
         (3, TypeError, "features: expected one or several of vertex_face, edge_edge, got int"),

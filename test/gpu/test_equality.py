@@ -80,7 +80,7 @@ def test_any_number_of_gpus(gpus):
 
 def test_more_gpus_than_there_are_is_rejected():
     scene, _, _ = scenes.join([scenes.crumpled(np.random.default_rng(14), 8)])
-    with pytest.raises(ValueError, match="gpus: 1000 were asked for"):
+    with pytest.raises(ValueError, match="gpus: 1000 requested"):
         hc.Detector(scene, backend="hybrid", gpus=1000)
 
 

@@ -139,7 +139,7 @@ def test_too_many_vertices_of_a_marker():
 
 
 def test_a_shape_without_a_time_of_sending():
-    with pytest.raises(InvalidMessageError, match="its publisher tells no time of sending"):
+    with pytest.raises(InvalidMessageError, match="its publisher sends no source timestamp"):
         read("shape", shape_of(VERTICES, FACES), sent=0)
 
 

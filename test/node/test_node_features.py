@@ -82,9 +82,9 @@ def test_changed_from_step_to_step_recorded_and_verified(start_node, tmp_path, h
     done = hpccd("replay", path, "--csv", "steps.csv")
     only = "only edge_edge; only vertex_face"
     assert done.returncode == 0, done.stdout + done.stderr
-    assert f"VERIFIED: 5 responses are equal in every contact, time and hash (accuracy exact; {only})" in done.stdout
+    assert f"VERIFIED: 5 results are equal in every contact, time and hash (accuracy exact; {only})" in done.stdout
     done = hpccd("replay", path, "--features", "vertex_face")
-    assert done.returncode == 1 and "DIVERGED: 4 of 5 responses differ" in done.stdout, done.stdout
+    assert done.returncode == 1 and "DIVERGED: 4 of 5 results differ" in done.stdout, done.stdout
     done = hpccd("replay", path, "--features", "vertex_face,faces")
     assert done.returncode == 2 and "features: 'faces' is not known; use one of vertex_face" in done.stderr, done.stderr
 

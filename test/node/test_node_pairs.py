@@ -75,7 +75,7 @@ def test_given_changed_and_replayed(start_node, tmp_path, hpccd):
     assert_same_contacts(send(node, 4), frame(3), frame(4), scene(2e-3))
     assert node.stop() == 0
     done = hpccd("replay", path)
-    assert done.returncode == 0 and "VERIFIED: 4 responses are equal" in done.stdout, done.stdout + done.stderr
+    assert done.returncode == 0 and "VERIFIED: 4 results are equal" in done.stdout, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,7 @@ def test_streamed_recorded_verified_and_drawn(start_node, tmp_path, hpccd):
         replay = Replay(recording, recorded_setup.of_recording(recording))
         assert len(list(replay.steps())) == 7
     assert (replay.verified, replay.diverged, replay.unverified) == (7, 0, 0)
-    assert hpccd("view", str(path), "--out", str(picture)).returncode == 0
+    assert hpccd("view", str(path), "--output", str(picture)).returncode == 0
     assert picture.stat().st_size > 20_000
 
 

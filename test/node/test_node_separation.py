@@ -209,6 +209,6 @@ def test_recorded_with_all_its_changes_and_verified(start_node, tmp_path, hpccd)
     found = replay.distances
     assert (found.verified, found.diverged, found.unverified, found.first) == (3, 0, 0, "")
     done = hpccd("replay", path)
-    assert done.returncode == 0 and "  3 responses about distances are equal" in done.stdout, done.stdout
-    equal = "VERIFIED: 4 responses are equal in every contact, time and hash"
+    assert done.returncode == 0 and "  3 results about distances are equal" in done.stdout, done.stdout
+    equal = "VERIFIED: 4 results are equal in every contact, time and hash"
     assert f"{equal} (accuracy exact; separation 0.001; separation {told})" in done.stdout, done.stdout

@@ -97,7 +97,7 @@ def test_a_stream_of_markers(start_node, tmp_path, hpccd):
     replay, _ = replayed(late)
     assert (replay.verified, replay.diverged, replay.unverified) == (2, 0, 0)
     done = hpccd("replay", path)
-    assert done.returncode == 0 and "VERIFIED: 6 responses are equal" in done.stdout, done.stdout + done.stderr
+    assert done.returncode == 0 and "VERIFIED: 6 results are equal" in done.stdout, done.stdout + done.stderr
     assert hpccd("doctor", path).returncode == 0
     drawn = hpccd("view", path, "-o", tmp_path / "step.png")
     assert drawn.returncode == 0, drawn.stderr

@@ -302,7 +302,7 @@ def test_the_command(whole, tmp_path, hpccd):
         (("--from", "9" * 23), "has no message in this part; its messages are from 0 to "),
         (("--to", "0"), f"in this part; its messages are from 0 to {lasts} s"),
         (("--from", "3", "--to", "3"), f"in this part; its messages are from 0 to {lasts}"),
-        (("--from", "3", "--to", "2"), "exchange --from and --to"),
+        (("--from", "3", "--to", "2"), "swap --from and --to"),
     ):
         done = hpccd("cut", whole, *options, "-o", "none.mcap")
         assert done.returncode == 2 and words in done.stderr and done.stderr.count("\n") == 1
