@@ -9,7 +9,7 @@ import pytest
 import random_scenes
 
 import hpccd_core as hc
-from hpccd_core import shapes
+from hpccd_core import _core, shapes
 
 
 @pytest.fixture
@@ -84,6 +84,8 @@ def test_layout_changes_nothing_mesh_by_mesh(layout, worlds):
 def test_the_core_itself_takes_only_rows(meshes):
     start, end = np.asfortranarray(meshes.vertices_t0), np.ascontiguousarray(meshes.vertices_t1)
     with pytest.raises(ValueError, match="must be C-contiguous"):
+        _core.Positions(start)
+    with pytest.raises(TypeError, match="incompatible"):
         hc.Detector(meshes.scene())._core.detect(start, end)
 
 
