@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Record the inputs of a running node (topologies, vertices, points, transforms that it uses), its results (contacts,
-smallest distances), both as the bytes on the wire, and its parameters.
+smallest distances, pairs, stop), both as the bytes on the wire, and its parameters.
 
   hpccd record                          the node /hpccd, into ./hpccd-<date>.mcap, until Ctrl-C
   hpccd record -o run.mcap --node /arm/hpccd --duration 60

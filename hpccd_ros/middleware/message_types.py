@@ -15,6 +15,7 @@ JOINT_STATES = "sensor_msgs/msg/JointState"
 CONTACTS = "hpccd/msg/ContactArray"
 DISTANCES = "hpccd/msg/DistanceArray"
 PAIRS = "hpccd/msg/PairSummaryArray"
+STOP = "std_msgs/msg/Bool"
 
 # A name may come from a recording: it must not leave the folders of messages, nor import another module.
 _TYPE_NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/([a-z]+)/([A-Za-z][A-Za-z0-9_]*)")

@@ -119,7 +119,6 @@ class Configuration:
 # Types of the node's own topics, and of those that every ROS node has.
 _PUBLISHED = {
     **RESULTS,
-    topic_names.STOP: "std_msgs/msg/Bool",
     topic_names.MARKERS: "visualization_msgs/msg/MarkerArray",
     topic_names.SURFACE: message_types.POINTS,
     topic_names.DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",

@@ -134,7 +134,7 @@ class StopState:
                 self._doubts = {key: item for key, item in self._doubts.items() if not item.settled(by_name)}
         if near:
             pair = " and ".join(near)
-            self._set_cause(Cause.NEAR, f"{pair} came within {distance:g} of each other on the last step, or touched")
+            self._set_cause(Cause.NEAR, f"{pair} came within {distance:g} of each other in the last step")
             return
         with self._condition:
             if distance < self.distance or scene is not self._scene or not self._active:

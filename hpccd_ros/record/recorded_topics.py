@@ -20,6 +20,7 @@ from hpccd_ros.middleware.message_types import (
     POINTS,
     POSE,
     SHAPE,
+    STOP,
     TOPOLOGY,
     VERTICES,
 )
@@ -35,7 +36,12 @@ POSITIONS = {
     topic_names.POSE: POSE,
 }
 # Relative name -> type of results of the node.
-RESULTS = {topic_names.CONTACTS: CONTACTS, topic_names.DISTANCES: DISTANCES, topic_names.PAIRS: PAIRS}
+RESULTS = {
+    topic_names.CONTACTS: CONTACTS,
+    topic_names.DISTANCES: DISTANCES,
+    topic_names.PAIRS: PAIRS,
+    topic_names.STOP: STOP,
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,8 +80,9 @@ def of_node(parameters: dict) -> list[Wanted]:
     described = dict.fromkeys(robot_parameters.topics(robots).values())
     wanted += [Wanted(topic, DESCRIPTION, latched=1) for topic in described]
     wanted += [Wanted(topic, JOINT_STATES) for topic in robot_parameters.joint_topics(robots)]
-    # Distances and summaries too: they may be switched on at any time.
-    return [*wanted, *(Wanted(name, type_name) for name, type_name in RESULTS.items())]
+    # Distances and summaries too: they may be switched on at any time. Without stop_distance, stop is of another node.
+    without = {topic_names.STOP} if parameters.get("stop_distance", -1.0) < 0 else {}
+    return [*wanted, *(Wanted(name, type_name) for name, type_name in RESULTS.items() if name not in without)]
 
 
 def types_by_role(meshes, robots: RobotValues) -> dict[str, str]:

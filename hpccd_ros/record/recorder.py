@@ -50,7 +50,8 @@ def _record(node, target, args, stop) -> int:
     if not parameters.get("meshes") and not parameters.get("robots"):
         raise UserError(f"--node {args.node}: it has neither meshes nor robots; name an hpccd node that has some")
     wanted = recorded_topics.of_node(parameters)
-    wanted += [topic for topic in map(_extra, args.topic) if topic.name not in {known.name for known in wanted}]
+    known = {node.resolve_topic_name(topic.name) for topic in wanted}
+    wanted += [topic for topic in map(_extra, args.topic) if node.resolve_topic_name(topic.name) not in known]
     files, missing = attachments.files(parameters)
     for text in missing:
         _warn(text)

@@ -7,9 +7,12 @@ import signal
 
 import numpy as np
 import pytest
+import stop_stream
 from lifecycle_msgs.msg import Transition
 from node_calls import change_state, set_parameter, stream
 from node_process import PATIENCE, NodeProcess
+from rclpy.serialization import deserialize_message
+from std_msgs.msg import Bool
 from waving_sheet import sheet_faces, sheet_positions
 
 from hpccd_ros.bag.examine import examine
@@ -75,6 +78,22 @@ def test_the_bytes_that_another_recorder_hears(start_node, tmp_path):
     with Recording(tmp_path / "own.mcap") as recording:
         assert recording.info["node"] == f"{node.namespace}/hpccd"
         assert recording.info["parameters"]["outputs"] == ["points"]
+
+
+def test_stop_is_recorded_and_is_no_input_of_a_replay(start_node, tmp_path):
+    path = tmp_path / "own.mcap"
+    with stop_stream.started(start_node, record=str(path)) as stream:
+        stream.start()
+        stream.frame(stop_stream.NEAR)
+        stream.expect(True)
+        topic = f"{stream.node.namespace}/stop"
+        assert stream.node.stop() == 0
+    assert len(_replayed(path)) == 2
+    with Recording(path) as recording:
+        said = [deserialize_message(m.data, Bool).data for m in recording.messages() if m.topic == topic]
+        assert topic not in recorded_setup.of_recording(recording).roles
+    since_false = said[said.index(False) :]
+    assert since_false == sorted(since_false) and since_false[-1], "false, then true"
 
 
 def test_begun_and_ended_at_run_time(start_node, tmp_path):

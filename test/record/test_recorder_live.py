@@ -46,7 +46,8 @@ def _verified(path):
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 def test_recorded_live_read_by_others_and_verified(live, namespace, tmp_path, stop):
     path = tmp_path / "run.mcap"
-    recorder = _record(live, path, stop=stop, node_options=(OUTPUTS,))
+    known = f"{namespace}/contacts=hpccd/msg/ContactArray"
+    recorder = _record(live, path, "--topic", known, stop=stop, node_options=(OUTPUTS,))
     assert "LOST" not in recorder.last_words() and recorder.has_printed("recorded ")
 
     steps = _verified(path)
