@@ -30,6 +30,8 @@ exclude_patterns = ["figures"]
 html_theme = "furo"
 html_title = f"hpccd {release}"
 html_copy_source = False
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 myst_enable_extensions = ["deflist"]
 myst_heading_anchors = 4  # pages link to headings as GitHub names them
 copybutton_prompt_text = "$ "  # a copied console block is what one types, without prompts and output
@@ -38,6 +40,7 @@ copybutton_exclude = ".linenos, .gp, .go"
 # Python: numpydoc sections, and types by their short names.
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
+maximum_signature_line_length = 100
 autodoc_default_options = {"members": True}
 numpydoc_show_class_members = False
 # Without a network the site is built as well: nothing of other sites is fetched.

@@ -51,9 +51,8 @@ def _fields(text: str) -> list[str]:
         if not fields:
             lines += [*words, ""]
             continue
-        for field, *_ in fields:
-            kind, name = field.strip().split(maxsplit=1)
-            lines.append(f"**{name}** `{kind}`")
+        named = [field.strip().split(maxsplit=1) for field, *_ in fields]
+        lines.append(", ".join(f"**{name}** `{kind}`" for kind, name in named))  # the term of a definition is one line
         lines += [f"{': ' if not k else '  '}{line}".rstrip() for k, line in enumerate(words)] + [""]
     return lines
 

@@ -155,3 +155,21 @@ def test_architecture_names_every_module_once(heading, folder):
     section = text.partition(f"## {heading}\n")[2].partition("\n#")[0]
     modules = [path.name for path in folder.iterdir() if path.is_dir() and path.name != "__pycache__"]
     assert sorted(re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE)) == sorted(modules)
+
+
+@pytest.mark.parametrize("header", sorted((ROOT / "hpccd_core" / "include").rglob("*.h")), ids=lambda path: path.name)
+def test_each_member_has_a_declaration_of_its_own(header):
+    """The C++ reference has only the first name of a declaration."""
+    member = r"^ +(?!using )(?:const )?[\w:]+(?:<.*>)?[ *]+\w+(?: = [^,;()]+)?, ?\*?\w+(?: = [^,;()]+)?[,;].*$"
+    assert re.findall(member, header.read_text(), re.MULTILINE) == []
+
+
+def test_fields_of_interfaces_are_terms_of_definitions():
+    """A definition has one line of terms; with more, its text runs on behind them."""
+    spec = importlib.util.spec_from_file_location("generate", ROOT / "docs" / "generate.py")
+    generate = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(generate)
+    lines = generate.interfaces().splitlines()
+    starts = [k for k, line in enumerate(lines) if line.startswith(": ")]
+    assert len(starts) > 50
+    assert all(lines[k - 1].startswith("**") and not lines[k - 2] for k in starts)

@@ -47,10 +47,10 @@ struct Options {
   double minimum_separation = 0;
   Method method = Method::standard;  ///< broad phase on CPUs
   bool restructure = true;           ///< for `published` and `naive`: whether nodes that cull badly are rebuilt
-  /// For Backend::hybrid (Kim et al. 2009, section 5.1): hybrid_segments is the number of segments of the triangle
-  /// index queue, 1 to 65,536; hybrid_segment_pairs the pairs per segment, 1 to 2^20.
-  std::size_t hybrid_segments = 128, hybrid_segment_pairs = 2048;
-  int gpus = 0;  ///< for Backend::hybrid: number of GPUs; 0: all
+  /// For Backend::hybrid (Kim et al. 2009, section 5.1): number of segments of the triangle index queue, 1 to 65,536.
+  std::size_t hybrid_segments = 128;
+  std::size_t hybrid_segment_pairs = 2048;  ///< for Backend::hybrid: pairs per segment, 1 to 2^20
+  int gpus = 0;                             ///< for Backend::hybrid: number of GPUs; 0: all
   /// For Backend::gpu: profile() also contains the device time of each stage. Each event costs about 1 us.
   bool gpu_stages = false;
   /// Features that detect, collision_free_step and proximity test. Intersections and distances use whole surfaces.

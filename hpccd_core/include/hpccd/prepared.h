@@ -16,10 +16,11 @@ class Detector;
 
 /// Counts and state of a prepared detection, in the device's memory.
 struct PreparedCounts {
-  std::uint64_t vertex_face, edge_edge;  ///< vertex_face, edge_edge: numbers of rows; 0 unless complete
-  std::uint64_t state;                   ///< `complete`, or a sum of the other values: then the rows are invalid
-  std::uint64_t hash;                    ///< as in Contacts
-  double first_toc;                      ///< as in Contacts
+  std::uint64_t vertex_face;  ///< number of vertex-face rows; 0 unless complete
+  std::uint64_t edge_edge;    ///< number of edge-edge rows; 0 unless complete
+  std::uint64_t state;        ///< `complete`, or a sum of the other values: then the rows are invalid
+  std::uint64_t hash;         ///< as in Contacts
+  double first_toc;           ///< as in Contacts
 
   static constexpr std::uint64_t complete = 0;         ///< the rows are those of detect_on_device
   static constexpr std::uint64_t no_room = 1;          ///< a list was too short
@@ -32,14 +33,17 @@ struct PreparedCounts {
 struct PreparedResults {
   std::shared_ptr<const void> memory;                ///< owns all arrays below
   int device = -1;                                   ///< number of the device
-  std::uint64_t room_vf = 0, room_ee = 0;            ///< room_vf, room_ee: capacity in rows
+  std::uint64_t room_vf = 0;                         ///< capacity of vf in rows
+  std::uint64_t room_ee = 0;                         ///< capacity of ee in rows
   const std::array<std::uint32_t, 2>* vf = nullptr;  ///< vertex, face
   const std::array<std::uint32_t, 4>* ee = nullptr;  ///< the vertices of both edges
   const double* tocs = nullptr;            ///< times of impact of the vertex-face rows, then of the edge-edge rows
   const PreparedCounts* counts = nullptr;  ///< numbers of rows and state
-  /// vf_offsets, ee_offsets, hashes: for several worlds, otherwise null; as in DeviceResults, no rows unless complete.
-  const std::uint64_t *vf_offsets = nullptr, *ee_offsets = nullptr, *hashes = nullptr;
-  const double* first_tocs = nullptr;  ///< for several worlds, otherwise null; as in DeviceResults
+  /// For several worlds, otherwise null; as in DeviceResults, no rows unless complete.
+  const std::uint64_t* vf_offsets = nullptr;
+  const std::uint64_t* ee_offsets = nullptr;  ///< as vf_offsets
+  const std::uint64_t* hashes = nullptr;      ///< as vf_offsets
+  const double* first_tocs = nullptr;         ///< for several worlds, otherwise null; as in DeviceResults
 };
 
 /// A detection on fixed device arrays, created by Detector::prepare with the options and separations of that time. It

@@ -17,8 +17,10 @@ inline namespace v0_1 {
 
 /// Rows of each world in the arrays of all worlds. Empty for a detector of one world.
 struct WorldSlices {
-  std::vector<std::uint64_t> vf, ee, ef;  ///< worlds + 1 offsets: world k has the rows from [k] to [k + 1]
-  std::vector<std::uint64_t> hashes;      ///< the hash of each world
+  std::vector<std::uint64_t> vf;      ///< worlds + 1 offsets: world k has the rows from [k] to [k + 1]
+  std::vector<std::uint64_t> ee;      ///< as vf
+  std::vector<std::uint64_t> ef;      ///< as vf
+  std::vector<std::uint64_t> hashes;  ///< the hash of each world
 };
 
 /// Contacts of one motion step in canonical order, the same on every backend and for any number of threads: vertex-face
@@ -28,13 +30,15 @@ struct Contacts {
   std::vector<double> vf_toc;                    ///< time of impact: the earliest time at which the two touch
   std::vector<std::array<std::uint32_t, 4>> ee;  ///< the vertices of both edges
   std::vector<double> ee_toc;                    ///< time of impact
-  /// Contact points and unit normals: vf rows, then ee rows; empty unless requested in Options. The normal points to
-  /// the side of the face on which the vertex is just before toc, or from edge a to the side on which edge b is then.
-  /// For a contact at t = 0 it points to where the straight-line motion would have come from. It is zero if the motion
-  /// is coplanar throughout, or if the features are degenerate or parallel at toc. With a minimum separation, the point
-  /// is the midpoint of the nearest points at toc, and the normal the direction from face to vertex or from edge a to
-  /// b.
-  std::vector<std::array<double, 3>> points, normals;
+  /// Contact points: vf rows, then ee rows; empty unless requested in Options. With a minimum separation, the midpoints
+  /// of the nearest points at toc.
+  std::vector<std::array<double, 3>> points;
+  /// Unit normals: vf rows, then ee rows; empty unless requested in Options. The normal points to the side of the face
+  /// on which the vertex is just before toc, or from edge a to the side on which edge b is then. For a contact at t = 0
+  /// it points to where the straight-line motion would have come from. It is zero if the motion is coplanar throughout,
+  /// or if the features are degenerate or parallel at toc. With a minimum separation, it is the direction from face to
+  /// vertex or from edge a to b.
+  std::vector<std::array<double, 3>> normals;
   std::vector<std::array<std::array<double, 3>, 2>> closest;   ///< nearest points of both sides at toc
   double first_toc = std::numeric_limits<double>::infinity();  ///< infinite without contacts
   /// Hash of features and times: the same for the same contacts on every backend and for any number of threads. For
@@ -67,7 +71,8 @@ struct Intersections {
 enum class GapKind : std::uint8_t { none, vertex_face, edge_edge, edge_face };
 /// The smallest distance of two meshes in one frame.
 struct Gap {
-  std::uint32_t mesh_a, mesh_b;  ///< mesh_a, mesh_b: numbers of the meshes, mesh_a <= mesh_b
+  std::uint32_t mesh_a;                                       ///< number of the first mesh
+  std::uint32_t mesh_b;                                       ///< number of the second mesh, >= mesh_a
   double distance = std::numeric_limits<double>::infinity();  ///< 0 for edge_face, infinite for none
   GapKind kind = GapKind::none;                               ///< kind of the closest pair of features
   std::array<std::uint32_t, 4> features{};                    ///< as in vf, ee or ef, then zeros
@@ -78,21 +83,25 @@ struct Gap {
 /// Intersections. Later calls do not write to the memory while `memory` is held; afterwards they reuse it. It may
 /// outlive the detector.
 struct DeviceResults {
-  std::shared_ptr<const void> memory;                ///< owns all arrays below
-  int device = -1;                                   ///< number of the device; -1: page-locked host memory
-  std::uint64_t n_vf = 0, n_ee = 0, n_ef = 0;        ///< n_vf, n_ee, n_ef: numbers of rows
-  const std::array<std::uint32_t, 2>* vf = nullptr;  ///< vertex, face
-  const std::array<std::uint32_t, 4>* ee = nullptr;  ///< the vertices of both edges
-  const std::array<std::uint32_t, 3>* ef = nullptr;  ///< edge vertices, face
-  const double* values = nullptr;                    ///< times of impact, or distances: n_vf, then n_ee
-  /// points, normals: n_vf + n_ee rows; null unless requested.
-  const std::array<double, 3>*points = nullptr, *normals = nullptr;
+  std::shared_ptr<const void> memory;                             ///< owns all arrays below
+  int device = -1;                                                ///< number of the device; -1: page-locked host memory
+  std::uint64_t n_vf = 0;                                         ///< rows of vf
+  std::uint64_t n_ee = 0;                                         ///< rows of ee
+  std::uint64_t n_ef = 0;                                         ///< rows of ef
+  const std::array<std::uint32_t, 2>* vf = nullptr;               ///< vertex, face
+  const std::array<std::uint32_t, 4>* ee = nullptr;               ///< the vertices of both edges
+  const std::array<std::uint32_t, 3>* ef = nullptr;               ///< edge vertices, face
+  const double* values = nullptr;                                 ///< times of impact, or distances: n_vf, then n_ee
+  const std::array<double, 3>* points = nullptr;                  ///< n_vf + n_ee rows; null unless requested
+  const std::array<double, 3>* normals = nullptr;                 ///< n_vf + n_ee rows; null unless requested
   const std::array<std::array<double, 3>, 2>* closest = nullptr;  ///< n_vf + n_ee rows; null unless requested
   double first_toc = std::numeric_limits<double>::infinity();     ///< infinite without contacts
   std::uint64_t hash = 0;                                         ///< as in Contacts
-  /// vf_offsets, ee_offsets, ef_offsets, hashes: for several worlds, otherwise null; as in WorldSlices.
-  const std::uint64_t *vf_offsets = nullptr, *ee_offsets = nullptr, *ef_offsets = nullptr, *hashes = nullptr;
-  const double* first_tocs = nullptr;  ///< for several worlds, otherwise null; as in Contacts
+  const std::uint64_t* vf_offsets = nullptr;  ///< for several worlds, otherwise null; as in WorldSlices
+  const std::uint64_t* ee_offsets = nullptr;  ///< as vf_offsets
+  const std::uint64_t* ef_offsets = nullptr;  ///< as vf_offsets
+  const std::uint64_t* hashes = nullptr;      ///< the hash of each world, otherwise null
+  const double* first_tocs = nullptr;         ///< for several worlds, otherwise null; as in Contacts
 };
 
 /// Contacts without a copy: rows in the page-locked memory that a GPU has written, or else vectors.

@@ -79,11 +79,14 @@ class HPCCD_API Scene {
 
   /// A mesh, and the place of its vertices, faces and edges in the scene-wide arrays.
   struct Mesh {
-    std::string name;     ///< as given to add_mesh
-    MeshOptions options;  ///< as given to add_mesh
-    /// first_vertex, n_vertices, first_face, n_faces: its vertices and faces in the scene-wide numbering.
-    std::uint32_t first_vertex, n_vertices, first_face, n_faces;
-    std::uint32_t first_edge, n_edges;  ///< its edges in edges()
+    std::string name;            ///< as given to add_mesh
+    MeshOptions options;         ///< as given to add_mesh
+    std::uint32_t first_vertex;  ///< scene-wide number of its first vertex
+    std::uint32_t n_vertices;    ///< number of its vertices
+    std::uint32_t first_face;    ///< its first face in faces()
+    std::uint32_t n_faces;       ///< number of its faces
+    std::uint32_t first_edge;    ///< its first edge in edges()
+    std::uint32_t n_edges;       ///< number of its edges in edges()
   };
   /// All meshes, in the order added.
   const std::vector<Mesh>& meshes() const { return meshes_; }
