@@ -25,7 +25,7 @@ std::vector<double> positions(double height) {
   return {0, 0, height, 1, 0, height + 1, 0, 1, height + 1, -5, -5, 0, 5, -5, 0, 0, 5, 0};
 }
 
-// Of the message of what is thrown: up to the first colon, where the argument stands.
+// The argument that the exception names: its message up to the first colon.
 std::string refused(const std::function<void()>& call) {
   try {
     call();
@@ -102,7 +102,7 @@ TEST(Arguments, MeshesThatTheSceneHasNot) {
   EXPECT_EQ(scene->meshes().size(), 2u);
 }
 
-// Of the scene's own lists, which move while they grow.
+// Faces and edges from the scene's own lists, which move while they grow.
 TEST(Arguments, FeaturesOfTheSceneItself) {
   const auto scene = std::make_shared<Scene>();
   const std::uint32_t face[3] = {0, 1, 2};

@@ -7,7 +7,7 @@
 
 namespace hpccd::test {
 
-// Bit for bit, in the same order.
+// Bit-identical, in the same order.
 inline void expect_equal(const Contacts& a, const Contacts& b) {
   EXPECT_EQ(a.vf, b.vf);
   EXPECT_EQ(a.ee, b.ee);

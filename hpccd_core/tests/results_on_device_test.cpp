@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint32_t side = 5;
 
-// What the error says; empty where there is none.
+// The text of the error; empty if there is none.
 std::string error_of(const std::function<void()>& act) {
   try {
     act();

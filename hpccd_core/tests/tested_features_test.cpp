@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is tested at all, of the whole scene and by pair of meshes: the full result with the other kind left out, from
+// Tested features, of the whole scene and by pair of meshes: the full result with the other kind left out, from
 // every way to find it.
 #include <gtest/gtest.h>
 

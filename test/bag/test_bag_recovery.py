@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was flushed survives, and `hpccd doctor` makes it a recording again."""
+"""Flushed data survives, and `hpccd doctor` makes it a recording again."""
 
 import random
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What others sent, quoted: readable, bounded, and with nothing in it that a terminal obeys."""
+"""Untrusted text, quoted: readable, bounded, and without terminal control sequences."""
 
 import pytest
 

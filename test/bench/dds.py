@@ -124,7 +124,7 @@ class NodeStatus:
         return int(self.values.get(part, {}).get(key, 0))
 
     def counts(self) -> dict[str, int]:
-        """Of vertex messages: received, middleware (lost on the way), processed, dropped, waiting."""
+        """Counts of vertex messages: received, middleware (lost on the way), processed, dropped, waiting."""
         counts = {key: self.count(key) for key in ("received", "processed", "dropped", "waiting")}
         return {**counts, "middleware": self.count("dropped.middleware")}
 

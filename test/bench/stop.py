@@ -79,7 +79,7 @@ def run(args) -> lab.Report:
                 report.add(what="cost", **_cost(source, apart))
             done()
     first, *others = (row for row in report.rows if row["what"] != "cost")
-    lab.show("approaches: from the frame that ends a step which comes near to stop, ms", APPROACHES, [first])
+    lab.show("approaches: from the frame that ends a near step to stop, ms", APPROACHES, [first])
     lab.show("from the end of what went before to stop, ms", ENDS, others)
     costs = [row for row in report.rows if row["what"] == "cost"]
     lab.show("what it costs, ms a step (medians)", COSTS, costs)
@@ -134,7 +134,7 @@ class Ears:
         self._thread.join()
 
     def at(self, when: float) -> bool:
-        """What was said then."""
+        """The value published then."""
         return next(said for since, said in reversed(self.changes) if since <= when)
 
     def rise(self, begin: float) -> float | None:
@@ -190,13 +190,13 @@ def _approaches(report, args, session: dds.Session, ears: Ears) -> None:
     row = {**judged, "frame_ms": 1e3 / args.rate, "look_ms": look, **_percentiles(rises)}
     report.add(what="approaches", trials=args.trials, **row)
     if judged["missed"] or judged["late"]:
-        wrong = f"stop missed {judged['missed']} steps that come near, and rose late {judged['late']} times"
+        wrong = f"stop missed {judged['missed']} near steps, and rose late {judged['late']} times"
         report.failure(wrong)
     _silence(report, args, "silence", silences)
 
 
 def judge(truth: list[bool], sent: list[float], ears: Ears, period: float, timeout: float) -> dict:
-    """truth: which steps come near; the first frame ends none. rise_s: from the frame with which a step ends that comes
+    """truth: which steps are near; the first frame ends none. rise_s: from the frame with which a step ends that comes
     near, after one that did not, to stop; late: those that took longer than a frame. missed: steps that come near
     without stop being true before the silence of what follows would make it so. false: of steps that do not, and
     follow one that did not, those with stop true a frame later."""

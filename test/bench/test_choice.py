@@ -51,7 +51,7 @@ def test_the_cheapest_that_keeps_all_bounds_is_taken():
     fast, balanced, exact = outcome("fast", 1, misses=1e-3), outcome("balanced", 2, late=1e-14), outcome("exact", 3)
     for bounds, taken in {"misses<1e-2": fast, "misses<1e-3": balanced, "misses<1e-3, late<=0": exact}.items():
         assert choice.cheapest([exact, fast, balanced], choice.parse(bounds)) is taken
-    # Of equally fast ones the more accurate one.
+    # Among equally fast ones the more accurate one.
     alike = [outcome("balanced", 2.0, error=1e-14), outcome("exact", 2.09), outcome("exact", 2.2)]
     assert choice.cheapest(alike, choice.parse("misses<1e-3")) is alike[1]
 
@@ -79,7 +79,7 @@ def test_outcomes_are_of_the_worst_scene_and_of_settings_that_all_were_tested_wi
 
 
 class Found:
-    """What a detector would report."""
+    """Contacts as a detector would report them."""
 
     def __init__(self, vf, toc):
         self.vf, self.vf_toc = np.array(vf, np.uint32).reshape(-1, 2), np.array(toc)

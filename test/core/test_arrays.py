@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What arrays may look like, and that those in order are read in place."""
+"""Accepted layouts of arrays; suitable ones are read in place."""
 
 import threading
 import tracemalloc

@@ -34,7 +34,7 @@ def rational(points):
 
 
 def squared_distance(kind, points):
-    """In rational numbers. Of two edges: how far the parallelogram of their differences stays from the origin."""
+    """In rational numbers. For two edges: how far the parallelogram of their differences stays from the origin."""
     p, q, r, s = points
     if kind == VERTEX_FACE:
         return squared_distance_to_triangle(p, [q, r, s])

@@ -128,7 +128,7 @@ class Mistakes:
 
     @staticmethod
     def only_one(self, start, end):
-        """Of several first contacts one is left out."""
+        """One of several first contacts is left out."""
         found = super(hc.Detector, self).detect(start, end)
         if self.report != "first" or len(found.vf) < 2:
             return found

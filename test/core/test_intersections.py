@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Edges that pierce or touch faces, in one snapshot: against the exact oracle, and by what must hold anyway."""
+"""Edges that intersect or touch faces, in one snapshot: against the exact oracle, and by what must hold anyway."""
 
 import numpy as np
 import oracle

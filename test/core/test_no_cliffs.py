@@ -165,7 +165,7 @@ def test_at_rest_exactly_at_the_separation(slides):
     ]
     assert at_start == list(of_start) and len(near.vf) > 0 and len(near.ee) > 0
     detector.detect(start, end)
-    if not slides:  # what slides comes near other features later, too
+    if not slides:  # a sliding mesh approaches other features later, too
         assert detector.stats["vf_by_extended"] == detector.stats["ee_by_extended"] == 0
 
 

@@ -164,7 +164,7 @@ def test_published_scenes(data_folder, name):
 
 
 def test_with_a_separation_it_is_the_direction_between_the_nearest_points():
-    # Beyond the face the vertex rises through its plane; then it comes near, from above.
+    # Beyond the face the vertex rises through its plane; then it approaches, from above.
     path = [(5, 0.2, -1), *FLOOR], [(0.2, 0.2, 0.2), *FLOOR]
     detector = single_pairs.detector(VERTEX_FACE, minimum_separation=0.5)
     toc, point, normal = single_pairs.contact(detector, VERTEX_FACE, np.array([*path[0], *path[1]], float))

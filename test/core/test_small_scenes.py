@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the scene rules out stays out where the whole hierarchy is one block of triangles, or hardly more."""
+"""Excluded pairs stay excluded if the whole hierarchy is one block of triangles, or hardly more."""
 
 import functools
 

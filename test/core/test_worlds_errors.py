@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is wrong with one of many worlds is said by its number, and leaves the detector as it was."""
+"""An error in one of many worlds names its number, and leaves the detector unchanged."""
 
 import threading
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the demo says of a node that it listens to: results and dropped frames, as the node counts them."""
+"""The demo's view of the node: results and dropped frames, as the node counts them."""
 
 import time
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether meshes come near on a step, beside brute force. No ROS."""
+"""Whether meshes come within the distance during a step, against brute force. No ROS."""
 
 import numpy as np
 import pytest
@@ -54,10 +54,10 @@ def test_what_pierces_far_from_all_borders():
     """As long as it does, and not when it was put apart."""
     builder, frame = scene((FACES, FACES))
     nearness = Nearness(builder, OPTIONS, 0.1)
-    pierced, apart = frame(NEEDLE, TABLE), frame(NEEDLE + (0, 0, 7), TABLE)
-    assert [nearness.within(*step)[0] for step in ((pierced, pierced),) * 2] == [MESHES, MESHES]
-    assert [nearness.within(*step)[0] for step in ((pierced, apart), (apart, apart))] == [MESHES, None]
-    assert nearness.within(apart, pierced)[0] and nearness.within(pierced, pierced)[0]
+    crossed, apart = frame(NEEDLE, TABLE), frame(NEEDLE + (0, 0, 7), TABLE)
+    assert [nearness.within(*step)[0] for step in ((crossed, crossed),) * 2] == [MESHES, MESHES]
+    assert [nearness.within(*step)[0] for step in ((crossed, apart), (apart, apart))] == [MESHES, None]
+    assert nearness.within(apart, crossed)[0] and nearness.within(crossed, crossed)[0]
 
 
 def test_the_meshes_that_are_near_are_named():
@@ -79,10 +79,10 @@ def test_a_static_mesh_that_is_put_elsewhere():
     builder, frame = scene((FACES, FACES), static=("table",))
     nearness = Nearness(builder, OPTIONS, 0.1)
     below, between = TABLE - (0, 0, 7), TABLE.copy()
-    apart, pierced = frame(NEEDLE, below), frame(NEEDLE, between)
+    apart, crossed = frame(NEEDLE, below), frame(NEEDLE, between)
     assert not nearness.within(apart, apart)[0] and not nearness.within(apart, frame(NEEDLE.copy(), below))[0]
     assert not nearness.within(apart, apart)[0]
-    assert nearness.within(apart, pierced)[0], "nothing moved there"
+    assert nearness.within(apart, crossed)[0], "nothing moved there"
 
 
 def test_meshes_that_are_not_tested_and_those_that_are():

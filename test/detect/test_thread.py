@@ -28,7 +28,7 @@ def frame(stamp, z, topology=OLD):
 
 
 class Run:
-    """What a detection thread made of ``frames``."""
+    """The results of a detection thread for ``frames``."""
 
     def __init__(self, *frames, reject_result_at=None):
         self.steps, self.starts, self.failed = [], [], []

@@ -20,7 +20,7 @@ SMALL = ("--cells", "16", "--frames", "30", "--picture", "")
 
 
 def run(folder, *words, status=0):
-    """What the example says."""
+    """The output of the example."""
     environment = {**os.environ, "PYTHONPATH": str(Path(hpccd_ros.__file__).parents[1])}
     done = subprocess.run(
         [sys.executable, PROGRAM, *words], cwd=folder, env=environment, capture_output=True, text=True, timeout=300

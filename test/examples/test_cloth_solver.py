@@ -111,7 +111,7 @@ class Blind(InProcess):
 
 
 def test_a_solver_that_misses_pairs_is_slow_but_never_touches():
-    """The guarantee is the guard's alone; and what has come as near as it lets it comes off again."""
+    """The guarantee depends on the guard alone, and a cloth at the smallest allowed distance can leave again."""
     queries = queries_of(SETUP, kind=Blind)
     simulation = Simulation(SETUP, queries)
     positions, parts = [simulation.positions], []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The way of a message through the pipeline: what goes in, what comes out, and that nothing is lost between. No ROS."""
+"""Messages through the pipeline: input, output, and nothing lost in between. No ROS."""
 
 import numpy as np
 import pytest

@@ -86,7 +86,7 @@ def test_missing_transforms_say_what_is_missing(source, stamp, text, final):
     assert caught.value.final == final
 
 
-def test_what_strangers_send_is_bounded(monkeypatch):
+def test_untrusted_transforms_are_bounded(monkeypatch):
     buffer = TransformBuffer()
     for k in range(30):
         buffer.add("world", "hand", turn(k), k * SECOND)

@@ -37,7 +37,7 @@ def in_a_frame(rng: np.random.Generator, local: np.ndarray, height: np.ndarray) 
     turned = np.einsum("nij,njk->nik", local, frame)
     axes = rng.permuted(np.tile(np.arange(3), (len(local), 1)), axis=1)
     turned = np.take_along_axis(turned, axes[:, None, :], axis=2) * rng.choice([-1, 1], size=(len(local), 1, 3))
-    # What all points do together changes no distance.
+    # A common motion of all points changes no distance.
     start, end = rng.integers(-3, 4, size=(2, len(local), 1, 3))
     turned[:, :4] += start
     turned[:, 4:] += end

@@ -25,7 +25,7 @@ DISTANCES, STEP = "distances", "step"
 OF_SCENES = (DISTANCES, STEP)
 PAIRS_OF_A_SCENE = 10  # a batch has a tenth as many scenes as single pairs: each scene has dozens of pairs
 
-# hit (Q,) bool; value (Q,) float64: time, distance, or 0. Of distances (Q,N): several results for each scene.
+# hit (Q,) bool; value (Q,) float64: time, distance, or 0. Distances (Q,N): several results for each scene.
 Results = tuple[np.ndarray, np.ndarray]
 
 

@@ -11,7 +11,7 @@ OFFSETS = ("vf_offsets", "ee_offsets", "ef_offsets", "first_tocs")
 
 
 def assert_same(found, expected):
-    """Every array, offset and hash. What is on the device is brought to the host first."""
+    """Every array, offset and hash. Data on the device is copied to the host first."""
     if hasattr(found, "to_host"):
         found = found.to_host()
     for name in (name for name in (*ARRAYS, *OFFSETS, "first_toc") if hasattr(expected, name)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whatever fails on the device, the frame is finished on the CPU and nothing is lost."""
+"""After any failure on the device the frame is finished on the CPU and nothing is lost."""
 
 import numpy as np
 import pytest

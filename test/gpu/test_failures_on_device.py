@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whatever fails on the device, results that stay there, and those of many worlds, are the CPU's; nothing leaks."""
+"""After any failure on the device, results that stay there, and those of many worlds, are the CPU's; nothing leaks."""
 
 import os
 

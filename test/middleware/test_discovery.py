@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who can meet a process of ours over a network: a network namespace with a cable to this one is the other machine."""
+"""Which processes can discover ours over a network: the other machine is a namespace with a cable to this one."""
 
 import os
 import subprocess

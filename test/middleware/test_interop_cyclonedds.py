@@ -74,7 +74,7 @@ def test_large_messages_cross_over_udp(start_node, tmp_path):
     assert results[-1].total > 100_000
 
 
-STRANGER = """
+OTHER_VENDOR = """
 import os
 import sys
 import cyclone_types as types
@@ -90,14 +90,14 @@ sys.stdin.read()
 def test_a_topic_that_ros_could_not_name_is_passed_over(start_node):
     node = start_node({"meshes": ["cloth"]})
     environment = {**os.environ, "CYCLONEDDS_URI": LOOPBACK, "PYTHONPATH": str(SUPPORT)}
-    command = [sys.executable, "-c", STRANGER, f"rt{node.namespace}/meshes/9/vertices"]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, env=environment) as stranger:
+    command = [sys.executable, "-c", OTHER_VENDOR, f"rt{node.namespace}/meshes/9/vertices"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, env=environment) as other:
         there = (f"{node.namespace}/meshes/9/vertices", ["hpccd/msg/MeshVertices"])
-        node.wait_until(lambda: there in node.peer.node.get_topic_names_and_types(), "topic of the stranger")
+        node.wait_until(lambda: there in node.peer.node.get_topic_names_and_types(), "topic of the other vendor")
         misspelt = node.peer.publisher(MeshVertices, "meshes/clot/vertices")  # waits until the node listens
         misspelt.publish(mesh_messages.vertices_message(sheet_positions(8, 0), 1))
         node.frames_status(dropped__clot__unknown_mesh=1)
-        stranger.stdin.close()
+        other.stdin.close()
 
 
 def assert_all_but_one(results, frames, faces, **options):

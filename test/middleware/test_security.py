@@ -18,7 +18,7 @@ ENCLAVE = "/hpccd"
 
 
 def policy_names():
-    """What policy.xml allows, in the names of DDS: (published, subscribed), as sros2 translates it."""
+    """The topics that policy.xml allows, in the names of DDS: (published, subscribed), as sros2 translates it."""
     published, subscribed = {"ros_discovery_info"}, {"ros_discovery_info"}
     for group in ElementTree.parse(FOLDER / "policy.xml").find(".//profile"):
         for entry in group:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is said on /diagnostics, and the markers."""
+"""The content of /diagnostics, and the markers."""
 
 import numpy as np
 from builtin_interfaces.msg import Time

@@ -86,7 +86,7 @@ def test_each_kind_of_callback(place):
 
 
 def test_a_message_that_cannot_be_taken(place):
-    """What fails before the callback begins holds up neither its subscription nor those beside it."""
+    """A failure before the callback begins holds up neither its subscription nor others."""
     node, heard = place.node, []
     subscription = node.create_subscription(UInt32, "number", heard.append, 10)
     publisher = node.create_publisher(UInt32, "number", 10)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whatever the node is started with: the documented exit status, one sentence where it does not start, no traceback."""
+"""Any arguments: the documented exit status, one sentence if the node does not start, no traceback."""
 
 import json
 import os

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What ~/detect keeps of a request for the next: the scene and its detector, unless the request was given up."""
+"""~/detect keeps parts of a request for the next one: the scene and its detector, unless the request was given up."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The action ~/detect over DDS: the service's responses, feedback, cancelling, and what strangers may do to it."""
+"""The action ~/detect over DDS: the service's responses, feedback, cancelling, and what other clients may do to it."""
 
 import resource
 import signal

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is tested at all: streamed, changed while the node runs, asked of ~/detect, recorded and computed again."""
+"""Tested features: streamed, changed while the node runs, requested from ~/detect, recorded and computed again."""
 
 import dataclasses
 

@@ -85,4 +85,4 @@ def test_asked_of_detect(start_node):
     response = future.result()
     expected = hc.Detector(scene()).intersections(frame(2)).ef
     assert response.success and response.contacts.total == len(expected) > 0
-    assert 0 in response.contacts.mesh_a, "edges of the rope pierce the cloth"
+    assert 0 in response.contacts.mesh_a, "edges of the rope intersect the cloth"

@@ -56,7 +56,7 @@ def test_a_stream_of_markers(start_node, tmp_path, hpccd):
     node.peer.await_readers("meshes/cloth/marker")
     node.wait_until(lambda: recorder.publishers(f"{node.namespace}/contacts"), "the second recorder to hear")
 
-    # What is rejected changes nothing of what is processed.
+    # A rejected message does not change processed ones.
     stop = marker_of(sheet(4), FACES, stamp=5, frame_id="world")
     stop.action = Marker.DELETE
     send(node, "marker", stop)

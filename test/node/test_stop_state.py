@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of the steps, and how old it is, to a stop that is true or not. No ROS."""
+"""From the known steps and their age to the value of stop. No ROS."""
 
 import threading
 import time

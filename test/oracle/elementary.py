@@ -40,7 +40,7 @@ def separation_vertex_face(queries: np.ndarray, distance: ArrayLike, threads: in
 
 
 def separation_edge_edge(queries: np.ndarray, distance: ArrayLike, threads: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """The same of two moving closed segments."""
+    """The same for two moving closed segments."""
     checked = _checked("queries", queries, 8)
     return _hit_and_toc(_oracle.separation_edge_edge(checked, _distances(distance, len(checked)), threads))
 
@@ -61,7 +61,7 @@ def squared_distance_vertex_face(points: np.ndarray) -> list[Fraction]:
 
 
 def squared_distance_edge_edge(points: np.ndarray) -> list[Fraction]:
-    """The same of points (Q,4,3), rows a0 a1 b0 b1."""
+    """The same for points (Q,4,3), rows a0 a1 b0 b1."""
     return _squared(_oracle.squared_distance_edge_edge, points)
 
 
@@ -72,7 +72,7 @@ def within_vertex_face(points: np.ndarray, distance: ArrayLike, threads: int = 0
 
 
 def within_edge_edge(points: np.ndarray, distance: ArrayLike, threads: int = 0) -> np.ndarray:
-    """The same of points (Q,4,3), rows a0 a1 b0 b1."""
+    """The same for points (Q,4,3), rows a0 a1 b0 b1."""
     checked = _checked("points", points, 4)
     return _oracle.within_edge_edge(checked, _distances(distance, len(checked)), threads)
 

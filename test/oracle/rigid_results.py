@@ -85,7 +85,7 @@ def judge(queries: Queries, results: Results) -> Verdict:
     truth = np.full(len(d), OPEN)
     truth[asked] = comes_within(pairs, d[asked], rows=asked)
     limit = d[found] + 2 * results.bound[found]
-    # As near as it says, when it says so: but for what the time may be off.
+    # At the reported time the distance is the reported one, except for the error of the time.
     apart = pairs.near(found, results.toc[found])[0]
     speed = _speed(pairs, found, results.toc[found])
     late_by = _TOC_ERROR * speed + 64 * np.finfo(float).eps * pairs.size()[found]

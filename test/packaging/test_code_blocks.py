@@ -19,7 +19,7 @@ from hpccd_ros.params import values
 from hpccd_ros.params.parameter_file import read_parameters
 
 SHOWN = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
-# Of one page; the longest starts a node and plays a few seconds.
+# Time limit for one page; the longest starts a node and plays a few seconds.
 PATIENCE = 240
 
 
@@ -55,7 +55,7 @@ def blocks(page: Path) -> list[Block]:
 
 
 def runs(page: Path) -> list[Run]:
-    """What a reader of the page runs, in its order."""
+    """The blocks that a reader of the page runs, in order."""
     found = []
     consoles = "".join(block.text for block in blocks(page) if block.language == "console")
     for number, block in enumerate(blocks(page)):

@@ -51,7 +51,7 @@ def test_workflow_installs_what_the_page_names(name):
 
 
 def test_hook_before_commits_is_make_lint():
-    """What is checked stands in the Makefile alone."""
+    """The checks are listed in the Makefile only."""
     (repository,) = load(ROOT / ".pre-commit-config.yaml")["repos"]
     (hook,) = repository["hooks"]
     assert repository["repo"] == "local" and hook["entry"] == "make lint" and hook["language"] == "system"

@@ -38,7 +38,7 @@ def configure(source: Path, build: Path, prefix: Path, *options: str) -> None:
 
 @pytest.fixture(scope="session")
 def results(prefix, tmp_path_factory):
-    """What the example prints, with the shared and with the static library."""
+    """The output of the example, with the shared and with the static library."""
     printed = {}
     for kind, option in (("shared", "ON"), ("static", "OFF")):
         build = tmp_path_factory.mktemp(kind)

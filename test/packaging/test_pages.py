@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the pages say is there: links, files, modules, commands and their options, layers."""
+"""Everything that the pages name exists: links, files, modules, commands and their options, layers."""
 
 import argparse
 import importlib

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a recording takes along of the files that a description names, which may be a stranger's."""
+"""The files of a description, possibly untrusted, that a recording contains."""
 
 import os
 import re
@@ -54,7 +54,7 @@ def test_nothing_else_is_read(tmp_path, uri):
     assert len(missing) == 1 and "is not in the recording" in missing[0]
 
 
-def test_warnings_about_what_a_stranger_wrote_are_short():
+def test_warnings_about_untrusted_text_are_short():
     (text,) = attachments.link_meshes("arm", VALUES, description("/" + 100_000 * "a" + ".stl"))[1]
     assert len(text) < 1000
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the core computes of joints: the very numbers of the oracle in Python, for recordings are computed again."""
+"""Joints in the core: bit-identical to the oracle in Python, because replays compute recordings again."""
 
 from concurrent.futures import ThreadPoolExecutor
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is read of a URDF, and what is rejected: by line and name, with the remedy."""
+"""Parts of a URDF that are read or rejected: by line and name, with the remedy."""
 
 import math
 

@@ -48,7 +48,7 @@ def in_blocks(distance, rows, others, size=200):
 
 
 def brute_force(mesh_a, a, mesh_b, b):
-    """Of two meshes that do not pierce each other."""
+    """Distance of two meshes that do not intersect."""
     return min(
         in_blocks(to_triangles, a, b[mesh_b.faces]),
         in_blocks(to_triangles, b, a[mesh_a.faces]),
@@ -58,7 +58,7 @@ def brute_force(mesh_a, a, mesh_b, b):
 
 @pytest.mark.parametrize("index", [0, 110, 360, *(pytest.param(index, marks=pytest.mark.long) for index in (60, 240))])
 def test_all_pairs(index):
-    """From far above the table, through the grip, to the end; where meshes pierce each other the distance is 0."""
+    """From far above the table, through the grip, to the end; where meshes intersect the distance is 0."""
     scene = scenes.make("arm-and-cloth", size=1 / 16)
     frame = scene.frame(index)
     detector = hc.Detector(scenes.core_scene(scene), threads=2)

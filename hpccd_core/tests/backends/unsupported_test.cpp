@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the GPU backend says of options that it does not have, on any machine: with and without a GPU, in builds without
-// CUDA too.
+// Errors of the GPU backend for options that it does not have, on any machine: with and without a GPU, in builds
+// without CUDA too.
 #include <gtest/gtest.h>
 
 #include "backends/gpu_backend.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who looks at a cancellation and when: between any two pieces of a loop, and within the work on one pair.
+// A cancellation is checked between any two pieces of a loop, and within the work on one pair.
 #include "base/cancellation.h"
 
 #include <gtest/gtest.h>

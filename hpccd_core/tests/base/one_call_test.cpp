@@ -32,7 +32,7 @@ TEST(OneCall, LetsOneInAtATime) {
   EXPECT_FALSE(call.abandoned());
 }
 
-// What a child finds: 0 where it gets in, 1 where it is told.
+// Exit status of a child: 0 if it enters, 1 if it gets the error.
 int in_a_child(OneCall& call) {
   const pid_t child = fork();
   if (child == 0) {
@@ -59,7 +59,7 @@ TEST(OneCall, AChildIsToldOfACallOfItsParent) {
   EXPECT_EQ(in_a_child(call), 0);
 }
 
-// Whatever the other thread does at that moment.
+// Independent of what the other thread does at that moment.
 TEST(OneCall, NoChildWaitsForEver) {
   OneCall call;
   std::atomic<bool> going{true};

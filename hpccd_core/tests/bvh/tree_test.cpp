@@ -106,7 +106,7 @@ TEST_F(TreeTest, RefitToTheSameMotionChangesNothing) {
   }
 }
 
-// What kernels read: rows of corners, and boxes of leaves in lanes.
+// Input of kernels: rows of corners, and boxes of leaves in lanes.
 struct RowsTest : TreeTest {
   void update_with(double separation, double t0, double t1) {
     const auto start = test::sheet_positions(n, t0, lone), end = test::sheet_positions(n, t1, lone);
@@ -170,7 +170,7 @@ TEST_F(RowsTest, FollowEveryKindOfBounds) {
       }
 }
 
-// What rests is left as it was, but where the rows are of another kind.
+// Nodes at rest are not changed, unless the rows are of another kind.
 TEST_F(RowsTest, OfWhatRestsComeWithAnotherKindOfBounds) {
   update_with(0, 0, 0.3);
   build(tree, *scene, features, motion, pool);

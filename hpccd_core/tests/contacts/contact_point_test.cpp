@@ -19,7 +19,7 @@ struct Moving {
   V t0[4], t1[4];
 };
 
-// Of plain contact.
+// Without a separation.
 PairPlaces places_of(Kind kind, const Moving& q, double toc) {
   UndecidedPair pair{kind, {}, {}, 0};
   for (int i = 0; i < 4; ++i) pair.t0[i] = q.t0[i], pair.t1[i] = q.t1[i];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What devices say of a pair's places is what CPUs say, unless they leave it open; and they leave little open.
+// Places of a pair on devices equal those on CPUs, unless devices leave them undecided; they leave few undecided.
 #include "contacts/pair_places.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The filtered tests against exact arithmetic, and the instruction sets against each other, bit for bit.
+// The filtered tests against exact arithmetic, and the instruction sets against each other: bit-identical.
 #include "elementary/batch.h"
 
 #include <gtest/gtest.h>
@@ -78,7 +78,7 @@ TEST_P(Elementary, FiltersAgreeWithIntegerArithmetic) {
   EXPECT_GT(contacts, 100);
 }
 
-// What a device decides with 106 bits, the CPU decides with integers: the hash of all contacts must be the same.
+// A device decides with 106 bits, the CPU with integers: the hash of all contacts must be the same.
 TEST_P(Elementary, HundredAndSixBitsAnswerAsIntegersOrNotAtAll) {
   int contacts = 0, none = 0;
   for (const Query& q : queries()) {

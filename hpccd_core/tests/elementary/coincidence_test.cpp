@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What share_a_place says, integers say: on a coarse lattice, where vertices often coincide.
+// share_a_place decides as integers do: on a coarse lattice, where vertices often coincide.
 #include "elementary/coincidence.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the tests of the published methods share: a swarm's hierarchy at a step, and what must hold of any hierarchy.
+// Common parts of the tests of the published methods: a swarm's hierarchy at a step, and what must hold of any
+// hierarchy.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -114,7 +114,7 @@ TEST_F(UpkeepTest, AnInterruptedStepIsFollowedByANewHierarchy) {
   expect_valid(upkeep.hierarchy());
 }
 
-// What the high-level nodes and the naive method rely on: all threads examine all nodes at once.
+// The high-level nodes and the naive method rely on this: all threads examine all nodes at once.
 TEST_F(UpkeepTest, ThreadsThatMeetAtNodesSeeOneHierarchy) {
   Upkeep upkeep(features, true);
   std::uint64_t restructured = 0;

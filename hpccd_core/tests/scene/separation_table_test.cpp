@@ -169,7 +169,7 @@ TEST(SeparationTable, NoTwoStatesHaveTheSameVersion) {
   }
 }
 
-// What is said of all pairs costs a look at all of them: only once after many changes.
+// A property of all pairs needs a pass over all of them: only once after many changes.
 TEST(SeparationTable, WhatIsSaidOfAllPairsFollowsWhenItSettles) {
   SeparationTable table(scene_of(3), 0);
   const std::uint64_t before = table.version();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is kept of static meshes from step to step must never show: every step gives what a new detector gives.
+// Data of static meshes kept from step to step never changes a result: every step equals that of a new detector.
 #include <gtest/gtest.h>
 
 #include <limits>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a list of near pairs leaves open: never too little, against all contacts, and little where neighbours go the
-// same way.
+// The remainder that a list of near pairs leaves to the search: never too little, against all contacts, and little
+// where neighbours go the same way.
 #include "traverse/drift.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What leaves out pairs of features that are far apart: nothing that is within the reach, by integers, and the same
+// The filter of pairs of features that are far apart drops none within the reach, by integers, and drops the same
 // with every instruction set.
 #include "traverse/far_pairs.h"
 

@@ -25,7 +25,7 @@ struct Found {
   bool operator==(const Found&) const = default;
 };
 
-// Of sheets, or of a soup, whose leaves have more corners than a row has lanes.
+// Scenes of sheets, or of a soup, whose leaves have more corners than a row has lanes.
 struct LeafPairsInPart : testing::TestWithParam<bool> {
   static constexpr std::uint32_t side = 13, triangles = 150;
   std::shared_ptr<const Scene> scene = GetParam() ? test::soup_scene(triangles) : test::two_sheets(side, 0);

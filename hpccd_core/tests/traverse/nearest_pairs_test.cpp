@@ -71,7 +71,7 @@ struct OneByOne {
     return best;
   }
 
-  // Of the features that a gap names, by integers.
+  // Distance of the features that a gap names, by integers.
   double distance_of(const Gap& gap) const {
     const auto& v = gap.features;
     if (gap.kind == GapKind::edge_edge) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the filters of distance queries prove, against integers, on as many pairs as the variable
+// Proofs of the filters of distance queries, against integers, on as many pairs as the variable
 // HPCCD_FILTER_QUERIES says: 20,000 where it is not set.
 #include <gtest/gtest.h>
 

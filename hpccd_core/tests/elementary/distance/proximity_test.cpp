@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the test of proximity proves in lanes against integers, most often a few roundings beside the border, where a
+// Proofs of the proximity test in lanes, against integers, most often a few roundings beside the border, where a
 // margin that is too small is wrong; and the instruction sets against each other.
 #include "elementary/distance/proximity_test.h"
 

@@ -53,8 +53,8 @@ struct Pairs {
 // A distance that is a few units of rounding more or less.
 double about(double d, std::mt19937_64& random) { return d * (1 + 0x1p-50 * (static_cast<double>(random() % 17) - 8)); }
 
-// Of all lengths: some that the ends decide, some that take a few steps, some that move together at the very distance,
-// so that no step tells, and some that pass each other at that distance in the middle of the step.
+// Searches of all lengths: some that the ends decide, some that take a few steps, some that move together at the very
+// distance, so that no step tells, and some that pass each other at that distance in the middle of the step.
 Pairs pairs_of_all_lengths(Kind kind, std::uint32_t n, int seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> real(-1, 1);

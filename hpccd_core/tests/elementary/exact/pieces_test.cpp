@@ -11,7 +11,7 @@
 namespace hpccd::exact {
 namespace {
 
-// Of magnitudes below 2^bits that reach it.
+// Numbers of magnitudes below 2^bits that reach it.
 Big wide_number(std::mt19937_64& random, int bits) {
   const Big most = (Big(1) << bits) - 1;
   Big x = random() % 4 ? most : Big(Big(random()) << (bits - 64 > 0 ? bits - 64 : 0)) % most;
