@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The package comes with two distributions: hpccd-core (the core alone) and hpccd (with the ROS node).
 
-Where both are installed the one that came last has overwritten the other, and which of two folders Python takes is a
-matter of the order of its path: neither should go unnoticed.
+If both are installed into one folder, the later one has overwritten the other; with two folders, the order of Python's
+path decides which one is imported. Both deserve a warning.
 """
 
 import sys
@@ -13,9 +13,9 @@ REMEDY = "Remedy: keep one of them; pip uninstall hpccd-core hpccd, then install
 
 
 def folders() -> list[Path]:
-    """The folders on Python's path that hold a compiled hpccd_core, the one that is taken first.
+    """The folders on Python's path that hold a compiled hpccd_core; the first one is imported.
 
-    Not what a build has left, which holds no package: colcon puts that on the path of its tests.
+    A build folder does not count, because it holds no package: colcon puts it on the path of its tests.
     """
     found = [Path(entry or ".").resolve() / "hpccd_core" for entry in sys.path]
     return [folder for folder in dict.fromkeys(found) if is_whole(folder)]
@@ -26,8 +26,8 @@ def is_whole(folder: Path) -> bool:
 
 
 def distributions() -> list[str]:
-    """Which of hpccd-core and hpccd are installed, with version and folder. Their names only are looked at: to read
-    what importlib.metadata knows would take longer than to import this package."""
+    """Which of hpccd-core and hpccd are installed, with version and folder. Only their file names are read: reading
+    importlib.metadata would take longer than importing this package."""
     return [
         f"{info.name.removesuffix('.dist-info')} in {folder.parent}"
         for folder in folders()
@@ -37,7 +37,7 @@ def distributions() -> list[str]:
 
 
 def warn_of_several() -> None:
-    """A RuntimeWarning where more than one is installed."""
+    """Issue a RuntimeWarning if more than one is installed."""
     names = distributions()
     places = folders()
     if len(names) > 1:

@@ -29,14 +29,14 @@ Word = TypeVar("Word", bound=str)
 
 
 def flag(name: str, value: object) -> bool:
-    """The value as bool: True, False, 1 or 0. Anything else has a truth too, but "no" has the wrong one."""
+    """The value as bool: True, False, 1 or 0. Other values have a truth value too, but that of "no" is True."""
     if isinstance(value, (bool, np.bool_)) or (_is_integer(value) and value in (0, 1)):
         return bool(value)
     raise TypeError(f"{name}: expected True or False, got {type(value).__name__}")
 
 
 def text(name: str, value: object) -> str:
-    """A string that has an UTF-8 encoding and is not empty."""
+    """A string that has a UTF-8 encoding and is not empty."""
     if not isinstance(value, str):
         raise TypeError(f"{name}: expected a string, got {type(value).__name__}")
     if not value:
@@ -415,7 +415,7 @@ def _no_array(name: str, value: object, error: Exception) -> TypeError:
 
 
 def reject_masked(name: str, value: object) -> None:
-    """A masked array with nothing masked is as good as any; of others the mask would be lost."""
+    """Raises ValueError for an array with masked elements, whose mask would be lost."""
     _kinds(name, value)
 
 

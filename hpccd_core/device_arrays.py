@@ -20,7 +20,7 @@ class CudaArray(Protocol):
 
 
 class DlpackArray(Protocol):
-    """The array API's way of handing over memory."""
+    """An array with the DLPack protocol of the array API."""
 
     def __dlpack__(self, *, stream: Any = ...) -> Any: ...
 
@@ -86,7 +86,7 @@ def stream_number(stream: object) -> int | None:
 
 
 def on_host(vertices: NDArray[Any], stream: int | None) -> _core.Positions | NDArray[Any]:
-    """For the core: with a stream that may still read rows of a result on the device that nobody holds any more."""
+    """Positions for the core, with the stream that may still read device rows of a released result."""
     return vertices if stream is None else _core.Positions(vertices, stream)
 
 
@@ -111,7 +111,7 @@ def positions(name: str, value: Any, expected: tuple[int, ...], stream: int | No
 
 
 def _in_order(shape: tuple[int, ...], strides: tuple[int, ...], size: int) -> bool:
-    """C-contiguous: along an axis of one element, as of one world, any stride will do."""
+    """Whether it is C-contiguous; along an axis of one element, such as one world, any stride is valid."""
     steps = (math.prod(shape[i + 1 :]) * size for i in range(len(shape)))
     return all(n == 1 or step == stride for n, step, stride in zip(shape, steps, strides, strict=True))
 
@@ -129,7 +129,7 @@ def _from_interface(name: str, interface: Any) -> _Layout:
 
 
 class LastStep:
-    """The positions of the last step in a copy on their device: whoever made them may write there again."""
+    """A copy of the positions of the last step on their device, so that the caller may overwrite its own array."""
 
     def __init__(self) -> None:
         self._memory: _core.MemoryOnDevice | None = None
@@ -139,8 +139,7 @@ class LastStep:
         return self.place is not None
 
     def keep(self, place: DevicePositions, rows: int) -> None:
-        """Copies what is at this place, after a query of it: whoever made it has ended. Raises RuntimeError where the
-        device fails."""
+        """Copy the positions of a query, which are complete by then. Raises RuntimeError if the device fails."""
         if self._memory is None:
             self._memory = _core.MemoryOnDevice()
         self.place = None

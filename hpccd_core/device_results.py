@@ -59,7 +59,7 @@ class _OnDevice:
         return Slices(**arrays)
 
     def read_slices(self) -> None:
-        """Where the rows of each world begin, now rather than when they are first asked for."""
+        """Read where the rows of each world begin now, not at the first access."""
         _ = self._slices_on_host
 
     def _world_number(self, k: int) -> int:

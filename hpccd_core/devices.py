@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where this build on this machine can compute."""
+"""Backends and GPUs that this build can use on this machine."""
 
 from __future__ import annotations
 

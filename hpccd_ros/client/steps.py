@@ -136,7 +136,7 @@ def _snapshot(
 
 
 def goal_from_request(request: Detect.Request) -> DetectAction.Goal:
-    """The goal of the action that asks for the same as a request to the service.
+    """Convert a request to the service into a goal of the action.
 
     Parameters
     ----------
