@@ -415,7 +415,7 @@ def _no_array(name: str, value: object, error: Exception) -> TypeError:
 
 
 def reject_masked(name: str, value: object) -> None:
-    """Raises ValueError for an array with masked elements, whose mask would be lost."""
+    """Raises TypeError for an array with masked elements, whose mask would be lost."""
     _kinds(name, value)
 
 
