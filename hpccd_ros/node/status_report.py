@@ -149,8 +149,8 @@ class Reporter:
             return self._status("detection", DiagnosticStatus.ERROR, f"failed: {data['last_failure']}", values)
         if coarse:
             text = (
-                f"{counted(coarse, 'step')} with a motion beyond rigid_tolerance: {data['last_coarse']}, so that "
-                "more is reported than touches; send poses or joint states more often, or raise rigid_parts or "
+                f"{counted(coarse, 'step')} with a motion beyond rigid_tolerance: {data['last_coarse']}, so there may "
+                "be more false positives; send poses or joint states more often, or raise rigid_parts or "
                 "rigid_tolerance"
             )
             return self._status("detection", DiagnosticStatus.WARN, text, values)

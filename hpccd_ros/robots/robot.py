@@ -137,7 +137,7 @@ class Robot:
         if unusable_coordinates(together, by_poses=True):
             for mesh, of_mesh in zip(self.meshes, vertices, strict=True):
                 if problem := unusable_coordinates(of_mesh, by_poses=True):
-                    raise RobotError(f"positions: with them, of {quoted(mesh.name)} {problem[1]}")
+                    raise RobotError(f"positions: in mesh {quoted(mesh.name)} {problem[1]}")
         return tuple(
             LinkPlacement.of(mesh.body, mesh.link, state, of_mesh)
             for mesh, of_mesh in zip(self.meshes, vertices, strict=True)
@@ -183,6 +183,6 @@ def _check_reach(description: urdf.Description, meshes: list[RobotMesh]) -> None
     reach = offsets + max(mesh.body.radius for mesh in meshes)
     if not reach <= LARGEST_OF_POSES:
         raise RobotError(
-            f"{urdf.DOCUMENT}: fully stretched, the robot would reach {reach:g}, and {LARGEST_OF_POSES:g} is the most; "
-            "fix the origins of joints or the sizes of links"
+            f"{urdf.DOCUMENT}: fully stretched, the robot would reach {reach:g}, beyond the limit of "
+            f"{LARGEST_OF_POSES:g}; fix the origins of joints or the sizes of links"
         )

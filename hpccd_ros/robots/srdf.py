@@ -43,7 +43,7 @@ def parse(text: str, links: Iterable[str]) -> Semantics:
 def _semantics(text: str, known: set[str]) -> Semantics:
     robot = xml_tree.parse(text, DOCUMENT, "robot")
     for element in robot.all("joint"):
-        raise element.error("is of a URDF; name the SRDF beside it, whose pairs are <disable_collisions>")
+        raise element.error("belongs to a URDF; name the SRDF, which has <disable_collisions>")
     unknown: list[str] = []
 
     def pairs(tag: str) -> frozenset[Pair]:
@@ -53,7 +53,7 @@ def _semantics(text: str, known: set[str]) -> Semantics:
     disabled, enabled = pairs("disable_collisions"), pairs("enable_collisions")
     by_default = _entries(robot.all("disable_default_collisions"), ("link",), known, unknown)
     ignored = (
-        f"{DOCUMENT}: entries that name links which the URDF does not have are ignored: {listed(unknown)}; check that "
+        f"{DOCUMENT}: entries about links that are not in the URDF are ignored: {listed(unknown)}; check that "
         "it is the SRDF of this robot"
     )
     return Semantics(disabled, enabled, frozenset(link for (link,) in by_default), ignored if unknown else "")

@@ -77,9 +77,9 @@ def parse(text: str, geometry: str = "collision") -> Description:
     robot = xml_tree.parse(text, DOCUMENT, "robot")
     for child in robot.children:
         if child.tag.startswith("xacro:"):
-            raise child.error("is of xacro; expand it first: xacro FILE > robot.urdf")
+            raise child.error("is a xacro element; expand the file first: xacro FILE > robot.urdf")
     if (count := len(robot.all("link"))) > MOST_LINKS:
-        raise robot.error(f"has {count} links; {MOST_LINKS} are allowed")
+        raise robot.error(f"has {count} links; at most {MOST_LINKS} are allowed")
     links: dict[str, Link] = {}
     for element in robot.all("link"):
         name = _name(element)
@@ -109,7 +109,7 @@ def parse(text: str, geometry: str = "collision") -> Description:
 def _name(element: Element) -> str:
     name = element.text("name")
     if len(name) > LONGEST_NAME or not name.isprintable():
-        raise element.error(f"has a name that cannot be used; give one of at most {LONGEST_NAME} printable characters")
+        raise element.error(f"has an invalid name; give one of at most {LONGEST_NAME} printable characters")
     return name
 
 
@@ -117,7 +117,7 @@ def _joint(element: Element, links: dict[str, Link]) -> RobotJoint:
     name, kind = _name(element), element.text("type")
     if kind in ("floating", "planar"):
         raise element.error(
-            f"is {kind}, which no single value moves; if it only places the robot, remove it, and place the base by TF "
+            f"is {kind}, so no single value moves it; if it only places the robot, remove it, and place the base by TF "
             "or by its pose"
         )
     if kind not in KINDS:
@@ -148,7 +148,7 @@ def _axis(element: Element, kind: str) -> tuple[float, float, float]:
     try:
         x, y, z = Joint.of(kind, -1, IDENTITY, given).axis.tolist()
     except ValueError as error:
-        raise element.error(f"has an axis that cannot be used: {error}") from error
+        raise element.error(f"has an invalid axis: {error}") from error
     return x, y, z
 
 
@@ -158,7 +158,7 @@ def _limits(element: Element, kind: str) -> tuple[float, float] | None:
         return None
     lower, upper = (_number(limit, name, 0.0) for name in ("lower", "upper"))
     if lower > upper:
-        raise element.error(f"has the lower limit {lower:g} above the upper one {upper:g}; exchange them")
+        raise element.error(f"has the lower limit {lower:g} above the upper one {upper:g}; swap them")
     return lower, upper
 
 
@@ -178,7 +178,7 @@ def _check_mimics(robot: Element, joints: dict[str, RobotJoint]) -> None:
                 why = "there is no such joint" if followed is None else "it does not move"
                 raise robot.error(f"has the joint {quoted(at.name)}, which mimics {quoted(at.mimic.joint)}: {why}")
             if followed.name in passed:
-                raise robot.error(f"has joints that mimic each other in a circle: {listed([*passed, followed.name])}")
+                raise robot.error(f"has joints that mimic each other in a cycle: {listed([*passed, followed.name])}")
             passed.append(followed.name)
             at = followed
 
@@ -188,7 +188,7 @@ def _tree(
 ) -> tuple[str, tuple[RobotJoint, ...]]:
     roots = [name for name in links if name not in moved_by]
     if len(roots) != 1:
-        what = f"several links that no joint moves ({listed(roots)})" if roots else "a circle of joints"
+        what = f"several links that no joint moves ({listed(roots)})" if roots else "a cycle of joints"
         raise robot.error(f"has {what}; links must form one tree")
     of_parent: dict[str, list[RobotJoint]] = {}
     for joint in joints.values():
@@ -201,7 +201,7 @@ def _tree(
         waiting += [joint.child for joint in found]
     if len(ordered) != len(joints):
         lost = sorted(set(joints) - {joint.name for joint in ordered})
-        raise robot.error(f"has joints in a circle: {listed(lost)}; links must form one tree")
+        raise robot.error(f"has joints in a cycle: {listed(lost)}; links must form one tree")
     return roots[0], tuple(ordered)
 
 

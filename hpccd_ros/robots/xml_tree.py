@@ -63,7 +63,7 @@ class Element:
         """Raises RobotError if there is none, or it is empty."""
         value = self.attributes.get(attribute, "")
         if not value.strip():
-            raise self.error(f"needs the attribute {attribute}")
+            raise self.error(f"has no attribute {attribute}; add it")
         if _LOST in value:
             raise self.error(f"has characters in {attribute} that were not sent as UTF-8; save the file as UTF-8")
         return value
@@ -98,7 +98,7 @@ def decoded(data: bytes) -> str:
 def parse(text: str, document: str, root: str) -> Element:
     """The root, whose tag must be ``root``. Raises RobotError."""
     if len(text) > MOST_CHARACTERS:
-        raise RobotError(f"{document}: has {len(text)} characters; {MOST_CHARACTERS} are allowed")
+        raise RobotError(f"{document}: has {len(text)} characters; at most {MOST_CHARACTERS} are allowed")
     top = _Builder(document).built(text)
     if top.tag != root:
         raise top.error(f"is the outermost element; it must be <{root}>")
@@ -126,7 +126,7 @@ class _Builder:
                 why = "is UTF-16, which was sent as if it were UTF-8; save it as UTF-8"
             raise RobotError(f"{self._document}: {why}") from error
         except UnicodeEncodeError as error:
-            raise RobotError(f"{self._document}: is no text: {error}; save it as UTF-8") from error
+            raise RobotError(f"{self._document}: is not text: {error}; save it as UTF-8") from error
         assert self._root is not None  # expat requires an element
         return self._root
 
@@ -134,9 +134,9 @@ class _Builder:
         self._count += 1
         element = Element(self._document, tag, attributes, self._parser.CurrentLineNumber)
         if self._count > MOST_ELEMENTS:
-            raise element.error(f"is one element too many; {MOST_ELEMENTS} are allowed")
+            raise element.error(f"is one element too many; at most {MOST_ELEMENTS} are allowed")
         if len(self._open) >= DEEPEST:
-            raise element.error(f"is more than {DEEPEST} elements deep; that is too deep")
+            raise element.error(f"is nested more than {DEEPEST} elements deep; nest fewer")
         if self._open:
             self._open[-1].children.append(element)
         else:

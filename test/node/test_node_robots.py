@@ -323,7 +323,7 @@ def test_of_a_srdf_that_cannot_be_used_its_own_parameter_is_named(start_node, tm
     robot = {**JOINTS, "description": str(description), "srdf": str(semantics)}
     node = start_node({**parameters(**robot), "autostart": False}, wait=False)
     assert not change_state(node, Transition.TRANSITION_CONFIGURE)
-    assert "robot.crane.srdf: SRDF, line 1: <disable_collisions> needs the attribute link2" in node.output()
+    assert "robot.crane.srdf: SRDF, line 1: <disable_collisions> has no attribute link2; add it" in node.output()
 
 
 def test_what_is_ignored_or_renamed_of_a_robot_is_logged_once(start_node, tmp_path):
@@ -339,7 +339,7 @@ def test_what_is_ignored_or_renamed_of_a_robot_is_logged_once(start_node, tmp_pa
         cloth(node, k)
     node.wait_until(lambda: node.output().count("[WARN]") >= 2, "both warnings")
     for text in (
-        "robot crane: SRDF: entries that name links which the URDF does not have are ignored: <disable_collisions> in "
+        "robot crane: SRDF: entries about links that are not in the URDF are ignored: <disable_collisions> in "
         "line 1 names 'hok'",
         "robot crane: URDF: in names of meshes / and : become _: link 'left/hook' is crane/left_hook",
     ):

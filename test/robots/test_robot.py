@@ -112,7 +112,7 @@ def test_places_that_the_core_cannot_take_are_rejected():
             Robot.of(URDF.replace('xyz="0 0 1"/></joint></robot>', f'xyz="{offset} {offset} 0"/></joint></robot>'))
     robot = Robot.of(URDF)
     state = robot.kinematics.state({"turn": 0.0, "slide": 0.0, "roll": 0.0}, Rigid.of((0, 2e147, 0), (0, 0, 0, 1)))
-    with pytest.raises(RobotError, match="of 'swing/rod' vertex 0 is .* a mesh that moves by poses must lie in"):
+    with pytest.raises(RobotError, match="in mesh 'swing/rod' vertex 0 is .* a mesh that moves by poses must lie in"):
         robot.placements(state)
 
 
@@ -127,7 +127,10 @@ def test_the_finer_the_tolerance_the_more_triangles():
         ({"geometry": "visual"}, "geometry: no link has <visual>, so the robot has no meshes; try collision"),
         ({"geometry": "both"}, "geometry: 'both'"),
         ({"urdf_text": URDF.replace(' name="swing"', "")}, "name: the description has none; give one"),
-        ({"srdf_text": SRDF.replace("link2", "link3")}, "SRDF, line 1: <disable_collisions> needs the attribute link2"),
+        (
+            {"srdf_text": SRDF.replace("link2", "link3")},
+            "SRDF, line 1: <disable_collisions> has no attribute link2; add it",
+        ),
         ({"tolerance": 0.0}, "link 'bob': tolerance 0: must be above 0"),
     ],
 )

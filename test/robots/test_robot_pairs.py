@@ -82,8 +82,8 @@ def test_what_an_srdf_disables_is_added_and_what_it_enables_is_put_back():
 @pytest.mark.parametrize(
     "inside, message",
     [
-        ('<disable_collisions link1="a"/>', "<disable_collisions> needs the attribute link2"),
-        ('<disable_default_collisions link=""/>', "<disable_default_collisions> needs the attribute link"),
+        ('<disable_collisions link1="a"/>', "<disable_collisions> has no attribute link2; add it"),
+        ('<disable_default_collisions link=""/>', "<disable_default_collisions> has no attribute link; add it"),
         ("<", "SRDF: is not XML"),
     ],
 )
@@ -101,7 +101,7 @@ def test_entries_that_name_unknown_links_and_joints_are_ignored_with_a_warning()
         '<joint_property joint_name="of another" property_name="p" value="1"/><end_effector name="e" parent_link="x"/>'
     )
     assert found.ignored == (
-        "SRDF: entries that name links which the URDF does not have are ignored: <disable_collisions> in line 1 names "
+        "SRDF: entries about links that are not in the URDF are ignored: <disable_collisions> in line 1 names "
         "'x', <enable_collisions> in line 2 names 'y', <disable_default_collisions> in line 2 names 'z'; check that it "
         "is the SRDF of this robot"
     )
@@ -116,5 +116,5 @@ def test_hostile_xml_is_rejected_here_too():
         srdf.parse("<!DOCTYPE r []><robot/>", "ab")
     with pytest.raises(RobotError, match="<srdf> is the outermost element"):
         srdf.parse("<srdf/>", "ab")
-    with pytest.raises(RobotError, match="SRDF, line 2: <joint name='j'> is of a URDF"):
+    with pytest.raises(RobotError, match="SRDF, line 2: <joint name='j'> belongs to a URDF"):
         srdf.parse('<robot><link name="a"/>\n<joint name="j"/></robot>', "ab")

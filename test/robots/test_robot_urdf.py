@@ -94,34 +94,34 @@ def test_what_others_put_beside_links_is_left_alone():
         ("robot_description", "URDF: is not XML"),
         ("<sdf/>", "line 1: <sdf> is the outermost element; it must be <robot>"),
         ("<robot/>", "<robot> has no <link>"),
-        (robot("", "<link/>"), "<link> needs the attribute name"),
-        (robot("", f'<link name="{"a" * 256}"/>'), "has a name that cannot be used; give one of at most 255 printable"),
-        (robot("", '<link name="a\u200bb"/>'), "has a name that cannot be used"),
+        (robot("", "<link/>"), "<link> has no attribute name; add it"),
+        (robot("", f'<link name="{"a" * 256}"/>'), "has an invalid name; give one of at most 255 printable"),
+        (robot("", '<link name="a\u200bb"/>'), "has an invalid name"),
         (robot("", '<link name="a"/>' * 2), "<link name='a'> is the second link of this name"),
         (robot(joint() * 2), "<joint name='j'> is the second joint of this name"),
         (robot(joint() + joint(name="k")), "has the child 'b', which joint 'j' moves already"),
         (robot(""), "several links that no joint moves \\(a, b\\)"),
-        (robot(joint() + joint(name="k", parent="b", child="a")), "has a circle of joints"),
+        (robot(joint() + joint(name="k", parent="b", child="a")), "has a cycle of joints"),
         (
             robot(joint(), LINKS.replace('"a"', '"c"') + '<link name="a"/>').replace(
                 "</robot>", joint(name="k", parent="b", child="a") + "</robot>"
             ),
-            "has joints in a circle: j, k",
+            "has joints in a cycle: j, k",
         ),
         (robot(joint(parent="x")), "<joint name='j'> has the parent 'x', which is not a link; links are a, b"),
         (robot(joint(child="a")), "one link as parent and child"),
         (robot('<joint name="j" type="fixed"><child link="b"/></joint>'), "<joint name='j'> has no <parent>"),
         (robot(joint('<parent link="a"/>')), "<parent> is the second in <joint>"),
-        (robot(joint(kind="floating")), "<joint name='j'> is floating, which no single value moves"),
+        (robot(joint(kind="floating")), "<joint name='j'> is floating, so no single value moves it"),
         (robot(joint(kind="planar")), "<joint name='j'> is planar"),
         (robot(joint(kind="hinge")), "<joint name='j'> has the type 'hinge'; choose from revolute"),
-        (robot(joint('<axis xyz="0 0 0"/>')), "<joint name='j'> has an axis that cannot be used"),
+        (robot(joint('<axis xyz="0 0 0"/>')), "<joint name='j'> has an invalid axis"),
         (robot(joint('<axis xyz="0 0"/>')), "<axis> has xyz='0 0'; it must be 3 finite numbers"),
         (robot(joint('<origin xyz="0 0 nan"/>')), "<origin> has xyz='0 0 nan'"),
         (robot(joint('<origin rpy="0 0 ${pi}"/>')), "<origin> has rpy="),
         (robot(joint('<limit lower="1" upper="0"/>')), "<joint name='j'> has the lower limit 1 above the upper one 0"),
         (robot(joint('<mimic joint="x"/>')), "has the joint 'j', which mimics 'x': there is no such joint"),
-        (robot(joint('<mimic joint="j"/>')), "mimic each other in a circle: j, j"),
+        (robot(joint('<mimic joint="j"/>')), "mimic each other in a cycle: j, j"),
         (robot(joint('<mimic joint="j" multiplier="x"/>')), "<mimic> has multiplier='x'; it must be a finite number"),
         (shape(""), "<geometry> has 0 shapes; it needs one"),
         (shape('<box size="1 1 1"/>' * 2), "<geometry> has 2 shapes"),
@@ -136,9 +136,12 @@ def test_what_others_put_beside_links_is_left_alone():
         (shape("<sphere/>"), "<sphere> has no radius; add the attribute with a finite number"),
         (shape('<cylinder radius="1"/>'), "<cylinder> has no length; add the attribute with a finite number"),
         (shape('<box size=" "/>'), "<box> has no size; add the attribute with 3 finite numbers with spaces between"),
-        (shape('<mesh filename=""/>'), "<mesh> needs the attribute filename"),
+        (shape('<mesh filename=""/>'), "<mesh> has no attribute filename; add it"),
         (shape('<mesh filename="a.stl" scale="1 0 1"/>'), "<mesh> has the scale 1 0 1"),
-        ('<robot xmlns:xacro="x">\n<xacro:include filename="a"/></robot>', "line 2: .* is of xacro; expand it first"),
+        (
+            '<robot xmlns:xacro="x">\n<xacro:include filename="a"/></robot>',
+            "line 2: .* is a xacro element; expand the file first",
+        ),
     ],
 )
 def test_what_cannot_be_used_is_rejected_by_name(text, message):
@@ -158,10 +161,10 @@ BOMB = """<?xml version="1.0"?>
         ('<!DOCTYPE robot SYSTEM "http://example.org/a.dtd"><robot/>', "has a document type"),
         ('<!DOCTYPE r [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot name="&a;"/>', "has a document type"),
         ("<robot name='&a;'/>", "is not XML: undefined entity"),
-        ("<robot>" + "<a>" * 100, "is more than 50 elements deep"),
+        ("<robot>" + "<a>" * 100, "is nested more than 50 elements deep"),
         ("<robot>" + "<a/>" * (xml_tree.MOST_ELEMENTS + 1), "is one element too many"),
         ("<robot>" + " " * xml_tree.MOST_CHARACTERS, "16000000 are allowed"),
-        ("<robot name='\ud800'/>", "is no text"),
+        ("<robot name='\ud800'/>", "is not text"),
         ("<robot name='\0'/>", "is not XML"),
         ("<robot a='1' a='2'/>", "is not XML: duplicate attribute"),
     ],
@@ -246,5 +249,5 @@ def test_a_long_chain_of_links_is_no_recursion():
     links = "".join(f'<link name="l{k}"/>' for k in range(count))
     joints = (joint(kind="fixed", name=f"j{k}", parent=f"l{k - 1}", child=f"l{k}") for k in range(1, count))
     assert len(urdf.parse(robot("".join(joints), links)).joints) == count - 1
-    with pytest.raises(RobotError, match="has 1001 links; 1000 are allowed"):
+    with pytest.raises(RobotError, match="has 1001 links; at most 1000 are allowed"):
         urdf.parse(robot("", links + '<link name="more"/>'))
