@@ -9,6 +9,8 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+# Characters of the file's name in that of the hidden folder beside it.
+_SHOWN = 32
 # Errors of writing to an open file, which name none.
 FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 
@@ -38,7 +40,7 @@ def whole_file(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), shown)
     folder = None
     try:
-        folder = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent))
+        folder = Path(tempfile.mkdtemp(prefix=f".{target.name[:_SHOWN]}.", suffix=".part", dir=target.parent))
         draft = folder / target.name
         yield draft
         if overwrite:

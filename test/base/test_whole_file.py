@@ -122,3 +122,10 @@ def test_a_pipe_is_written_to_directly(tmp_path):
         draft.write_text("streamed")
     reader.join()
     assert read == ["streamed"] and _names(tmp_path) == ["pipe"]
+
+
+@pytest.mark.parametrize("name", ["a" * 255, "ü" * 127])
+def test_the_longest_names(tmp_path, name):
+    with whole_file(tmp_path / name) as draft:
+        draft.write_text("x")
+    assert _names(tmp_path) == [name]
