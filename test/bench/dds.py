@@ -124,14 +124,15 @@ class NodeStatus:
         return int(self.values.get(part, {}).get(key, 0))
 
     def counts(self) -> dict[str, int]:
-        """Counts of vertex messages: received, middleware (lost on the way), processed, dropped, waiting."""
-        counts = {key: self.count(key) for key in ("received", "processed", "dropped", "waiting")}
-        return {**counts, "middleware": self.count("dropped.middleware")}
+        """Counts of vertex messages: received, middleware (lost on the way), answered (the kept results call
+        the processed ones so), dropped, waiting."""
+        counts = {key: self.count(key) for key in ("received", "dropped", "waiting")}
+        return {**counts, "answered": self.count("processed"), "middleware": self.count("dropped.middleware")}
 
     def unaccounted(self) -> int:
         """Messages that the counters do not explain: received + lost on the way - processed - dropped - waiting."""
         c = self.counts()
-        return c["received"] + c["middleware"] - c["processed"] - c["dropped"] - c["waiting"]
+        return c["received"] + c["middleware"] - c["answered"] - c["dropped"] - c["waiting"]
 
 
 def resident_mb(pid: int) -> float:

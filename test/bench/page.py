@@ -223,8 +223,8 @@ TABLES = {
     ),
     "robot": Table(
         ("robot-2-cores", "robot-4-of-16-cores", "robot-h100-4-of-16-cores"),
-        {"cores": "cores", "core on": "backend", "results": "results", "dropped": "dropped"}
-        | _to(1, results_per_second="results_hz")
+        {"cores": "cores", "core on": "backend", "results": "answers", "dropped": "dropped"}
+        | _to(1, results_per_second="answers_hz")
         | {
             f"{name}, ms: median / p95": joined(f"{part}_median_ms", f"{part}_p95_ms", digits=2, between=" / ")
             for name, part in (("frame to result", "whole"), ("detection", "detection"), ("core", "core"))

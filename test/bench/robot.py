@@ -31,7 +31,7 @@ SCENE = "arm-and-cloth"
 PATIENCE = 60.0  # s
 SETTLE = 1.0  # s, until the last results have come
 PARTS = ("whole", "detection", "core", "around", "added")
-COLUMNS = {"results": "results", "a second": "results_hz", "dropped": "dropped"}
+COLUMNS = {"results": "answers", "a second": "answers_hz", "dropped": "dropped"}
 COLUMNS |= dds.columns(**{part: part for part in PARTS})
 
 
@@ -94,8 +94,8 @@ def _measured(args, scene) -> dict:
     detection, core = np.array([times[message.step][3:5] for _, message in results]).T
     parts = zip(PARTS, (whole, detection, core, whole - detection, whole - core), strict=True)
     return {
-        "results": len(results),
-        "results_hz": (len(results) - 1) / (came[-1][0] - came[0][0]),
+        "answers": len(results),  # the name in kept results
+        "answers_hz": (len(results) - 1) / (came[-1][0] - came[0][0]),
         "contacts": float(np.median([message.total for _, message in results])),
         "parts": int(max(message.parts for _, message in results)),
         **{key: ms for part, of in parts for key, ms in dds.percentiles(f"{part}_", of).items()},

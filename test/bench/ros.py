@@ -45,7 +45,7 @@ TRIAL = 3.0  # s of a trial in the search of the sustained rate
 FINER = 1.1  # ratio of the rates that the search tries
 IN, OUT = {"scene": "scene", "MB in": "mb_in", "MB out": "mb_out", "contacts": "contacts"}, {"node / echo": "ratio"}
 LATENCY = IN | {"core median": "core_median_ms"} | dds.columns(node="node", echo="echo") | OUT
-PARTS = ("in", "hand over", "result", "out")
+PARTS = ("in", "hand over", "answer", "out")
 LOOP = {"scene": "scene", "MB sent": "mb_sent"}
 LOOP |= dds.columns(**{"over DDS": "loop", "in process": "core", "DDS more": "more"})
 RATES = {"scene": "scene", "run": "what", "Hz": "rate_hz", **{k: k for k in ("sent", "answered", "dropped")}}
@@ -345,11 +345,11 @@ def _trial(link: Link, status: dds.NodeStatus, pid: int, rate: float, seconds: f
     return {
         "rate_hz": count / took,
         "sent": count,
-        "answered": after["processed"],
+        "answered": after["answered"],
         "dropped": after["dropped"] - after["middleware"],
         "middleware": after["middleware"],
         # What the node never heard of at the end of a burst leaves no gap in its numbers: it must be missing here.
-        "unaccounted": count - after["processed"] - after["dropped"],
+        "unaccounted": count - after["answered"] - after["dropped"],
         "last_answered": lane.step in lane.came,
         **dds.percentiles("", lane.latencies_ms()),
         **{"memory_begin_mb": first, "memory_end_mb": last, "memory_most_mb": max(memory)},

@@ -381,7 +381,7 @@ class Soak:
                     row |= {
                         key: len(list((of / key2).iterdir())) for key, key2 in (("threads", "task"), ("files", "fd"))
                     }
-                    self._report.add(**row, results=self.load.counts["results"], **self.status.counts())
+                    self._report.add(**row, answers=self.load.counts["results"], **self.status.counts())
         process.send_signal(signal.SIGCONT)
         return tick
 

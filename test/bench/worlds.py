@@ -112,8 +112,8 @@ def _measure(result, name, steps, worlds, args):
 def _compare(result, what, found, worlds):
     """Rows and hashes of each world, by each way, with those of the one detector."""
     alone = found["one_detector"]
-    for way, result in found.items():
-        of_worlds = result if isinstance(result, list) else [result.world(k) for k in range(worlds)]
+    for way, given in found.items():
+        of_worlds = given if isinstance(given, list) else [given.world(k) for k in range(worlds)]
         for k, (mine, other) in enumerate(zip(of_worlds, alone, strict=True)):
             if mine.hash != other.hash or not all(np.array_equal(getattr(mine, r), getattr(other, r)) for r in ROWS):
                 result.failure(f"{what}, {way}: contacts of world {k} are not those of a detector of one world")

@@ -52,7 +52,7 @@ def test_pose_of_integers(start_node):
     rejected = set_parameter(node, "mesh.net.pose", [1, 0, 0, 0, 0, 0, 0])
     assert not rejected.successful and "mesh.net.pose: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]" in rejected.reason
     rejected = set_parameter(node, "threads", 1.0)
-    assert not rejected.successful and "Wrong parameter type" in rejected.reason
+    assert not rejected.successful and "threads: expected int, got float" in rejected.reason
     assert change_state(node, Transition.TRANSITION_CONFIGURE) and change_state(node, Transition.TRANSITION_ACTIVATE)
     topologies(node)
     for k in range(2):
