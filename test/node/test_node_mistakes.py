@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mistakes that users make with the node: each is reported with the problem and its remedy."""
 
+import functools
 import itertools
 import json
 import os
@@ -430,3 +431,8 @@ def test_mistakes_in_streams(start_node, tmp_path, names):
         raise AssertionError(f"not said: {list(lacking)}\n" + "\n".join(outputs)) from None
     for _, node, _, says in running:
         assert node.output().count(says) == 1, "once an episode"
+        node.wait_until(functools.partial(_reported, node, says), f"{says} on /diagnostics")
+
+
+def _reported(node, says):
+    return any(says in text for _, _, values in node.peer.statuses.values() for text in values.values())
