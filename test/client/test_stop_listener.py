@@ -138,6 +138,17 @@ def test_a_publisher_that_goes_away_is_true(place):
     place.until(lambda: not listener.stop, "another one")
 
 
+def test_another_reason_alone_is_no_change(place):
+    changes = []
+    listener, speaker = place.listener(on_change=lambda of: changes.append(of.stop)), place.speaker()
+    place.until(lambda: not listener.stop, "false")
+    speaker.says = True
+    place.until(lambda: listener.reason.endswith("/stop is true"), "true")
+    speaker.close()
+    place.until(lambda: "/stop: 0 publishers alive, 1 expected" in listener.reason, "end of the publisher")
+    assert changes == [False, True]
+
+
 def test_an_executor_that_stands_still(place):
     """What is read is true, and stays true when old messages are taken at last."""
     listener, speaker = place.listener(), place.speaker()
