@@ -19,7 +19,7 @@ from hpccd_ros.bag.decode import checked_type
 from hpccd_ros.bag.reader import RecordedTopic, Recording, RecordingError
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import listed
-from hpccd_ros.middleware import environment, qos, ros_start, stop_signals, transform_topics
+from hpccd_ros.middleware import environment, message_types, qos, ros_start, stop_signals, topic_names, transform_topics
 from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.pacing import Pace, next_wanted
@@ -60,10 +60,24 @@ def main(args) -> int:
 
 def _topics(recording, args) -> list[RecordedTopic]:
     if args.all:
-        return list(recording.topics.values())
+        stop = _stop_topics(recording)
+        for name in stop:
+            _print_status(f"{name} is not published: a listener would take a recorded false for a present one")
+        return [topic for name, topic in recording.topics.items() if name not in stop]
     setup = recorded_setup.of_recording(recording, args.params)
     inputs = {*setup.roles, *setup.described_on}
     return [topic for name, topic in recording.topics.items() if name in inputs]
+
+
+def _stop_topics(recording) -> list[str]:
+    """Those that the recorder stored as the node's topic stop; from another recorder, those of its type and name."""
+    stored = (recording.info or {}).get("topics")
+    roles = stored if isinstance(stored, dict) else {}
+    return [
+        name
+        for name, topic in recording.topics.items()
+        if topic.type_name == message_types.STOP and topic_names.STOP in (roles.get(name), name.rpartition("/")[2])
+    ]
 
 
 def _publisher(node, topic):

@@ -80,7 +80,7 @@ def test_the_bytes_that_another_recorder_hears(start_node, tmp_path):
         assert recording.info["parameters"]["outputs"] == ["points"]
 
 
-def test_stop_is_recorded_and_is_no_input_of_a_replay(start_node, tmp_path):
+def test_stop_is_recorded_and_is_no_input_of_a_replay(start_node, hpccd, tmp_path):
     path = tmp_path / "own.mcap"
     with stop_stream.started(start_node, record=str(path)) as stream:
         stream.start()
@@ -94,6 +94,10 @@ def test_stop_is_recorded_and_is_no_input_of_a_replay(start_node, tmp_path):
         assert topic not in recorded_setup.of_recording(recording).roles
     since_false = said[said.index(False) :]
     assert since_false == sorted(since_false) and since_false[-1], "false, then true"
+    # A listener would take a recorded false for a present one.
+    played = hpccd("replay", str(path), "--publish", "--all", "--subscribers", "0", "--wait", "0", "--rate", "0")
+    assert played.returncode == 0 and f"{topic} is not published" in played.stdout + played.stderr
+    assert f" on {len(recording.topics) - 1} topics" in played.stdout
 
 
 def test_begun_and_ended_at_run_time(start_node, tmp_path):
