@@ -69,9 +69,7 @@ def configure(parser):
     many.add_argument("--jobs", type=int, default=0, metavar="N", help="local processes; 0: one per core (default)")
     play = parser.add_argument_group("play over DDS")
     play.add_argument("--publish", action="store_true", help="publish the recorded meshes instead of verifying")
-    play.add_argument(
-        "--all", action="store_true", help="publish all recorded topics but stop, contacts too"
-    )
+    play.add_argument("--all", action="store_true", help="publish all recorded topics but stop, contacts too")
     play.add_argument(
         "--wait", type=float, default=10.0, metavar="S", help="seconds to wait for subscribers (default: %(default)s)"
     )
