@@ -85,7 +85,7 @@ def whole_number(name: str, value: SupportsIndex, low: int, high: int) -> int:
     except TypeError:
         raise TypeError(f"{name}: expected an integer, got {type(value).__name__}") from None
     if not low <= number <= high:
-        raise ValueError(f"{name}: must lie in [{low}, {high}], got {_shown(number)}")
+        raise ValueError(f"{name}: must lie in [{low}, {high}], got {shown(number)}")
     return number
 
 
@@ -106,7 +106,7 @@ def length(name: str, value: object) -> float:
     number = real(name, value)
     (bits,) = struct.unpack("<Q", struct.pack("<d", number))  # comparisons may take a negative denormal for 0
     if not math.isfinite(number) or bits > 1 << 63:
-        raise ValueError(f"{name}: must be finite and not negative, got {_shown(value)}")
+        raise ValueError(f"{name}: must be finite and not negative, got {shown(value)}")
     return number
 
 
@@ -147,11 +147,11 @@ def _holds(number: float, value: Any) -> bool:
 
 
 def _not_held(name: str, value: object) -> ValueError:
-    return ValueError(f"{name}: float64 cannot hold {_shown(value)} exactly; round it first, as float() does")
+    return ValueError(f"{name}: float64 cannot hold {shown(value)} exactly; round it first, as float() does")
 
 
 def _beyond(name: str, value: object) -> ValueError:
-    return ValueError(f"{name}: must lie within float64, got {_shown(value)}")
+    return ValueError(f"{name}: must lie within float64, got {shown(value)}")
 
 
 def _as_float64(name: str, array: NDArray[Any]) -> NDArray[np.float64]:
@@ -208,10 +208,19 @@ def _indices(name: str, value: object, rows: str, columns: int) -> NDArray[np.ui
         if bad.any():
             row, column = np.argwhere(bad)[0]
             raise ValueError(
-                f"{name}[{row}, {column}] is {_shown(integers[row, column])}, which {what}; "
+                f"{name}[{row}, {column}] is {shown(integers[row, column])}, which {what}; "
                 "indices count this mesh's vertices from 0"
             )
     return np.ascontiguousarray(integers, np.uint32)
+
+
+def integers(name: str, value: object) -> NDArray[Any]:
+    """Integers of any shape and size -> an array; a scalar is for `whole_number` to check."""
+    array = _array(name, value)
+    indices = _integers_of_any_size(value, array) if array.dtype.kind in "fO" else array
+    if array.ndim and array.size and array.dtype.kind not in "iu" and indices is array:
+        raise TypeError(f"{name}: expected integers, got {_kind(value, array)}")
+    return indices
 
 
 def _remedy_for_indices(name: str, array: NDArray[Any], columns: int) -> str:
@@ -495,7 +504,7 @@ def _kind(value: object, array: NDArray[Any]) -> str:
     return f"dtype {array.dtype}"
 
 
-def _shown(value: object) -> str:
+def shown(value: object) -> str:
     """As text that fits on a line; of a huge integer its size."""
     if isinstance(value, int) and abs(value) >= 10**20:
         return f"{'-' if value < 0 else ''}1e{(abs(value).bit_length() - 1) * 0.30103:.0f}"

@@ -163,11 +163,13 @@ class Scene:
         self._calls.append((name, values))
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"calls": list(self._calls)}
+        """The calls, and attributes that a user or a derived class added."""
+        return {name: value for name, value in vars(self).items() if name not in ("_core", "_ids", "_layout")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         Scene.__init__(self)
-        for name, values in state["calls"]:
+        vars(self).update(state, _calls=[])
+        for name, values in state["_calls"]:
             self._repeat(name, values)
 
     def _number(self, name: str, mesh: MeshName) -> int:
@@ -242,23 +244,22 @@ class Scene:
         if (vertex is None) == (face is None):
             raise TypeError("locate: give either vertex or face")
         name, value, total = ("vertex", vertex, self.n_vertices) if face is None else ("face", face, self.n_faces)
-        if total == 0 and np.size(value):
+        indices = arguments.integers(name, value)
+        if total == 0 and indices.size:
             raise ValueError(f"{name}: the scene has no {name}; add_mesh comes first")
         offsets = self.layout.vertex_offsets if face is None else self.layout.face_offsets
-        if not isinstance(value, (np.ndarray, list, tuple)) or np.ndim(value) == 0:
+        if indices.ndim == 0:
             index = arguments.whole_number(name, value, 0, total - 1)
             mesh = int(mesh_of(np.array(index), offsets))
             return self.layout.mesh_names[mesh], index - int(offsets[mesh])
-        indices = np.asarray(value)
         if indices.ndim > 1 and not (vertex is not None and indices.shape[1:] == (4,)):
             raise ValueError(
                 f"{name}: expected shape (N,), or (N, 4) as contacts.ee has, got {indices.shape}; of contacts.vf give "
                 "vertex=contacts.vf[:, 0] or face=contacts.vf[:, 1]"
             )
-        if indices.dtype.kind not in "iu" and indices.size:
-            raise TypeError(f"{name}: expected integers, got dtype {indices.dtype}")
         if indices.size and not (0 <= indices.min() and indices.max() < total):
-            raise ValueError(f"{name}: indices must lie in [0, {total - 1}], got {indices.min()} to {indices.max()}")
+            least, greatest = (arguments.shown(int(end)) for end in (indices.min(), indices.max()))
+            raise ValueError(f"{name}: indices must lie in [0, {total - 1}], got {least} to {greatest}")
         meshes = mesh_of(indices, offsets)
         return meshes, indices.astype(np.intp) - offsets[meshes]
 

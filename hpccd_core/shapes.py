@@ -50,6 +50,7 @@ def grid(columns: int, rows: int) -> tuple[NDArray[np.float64], NDArray[np.uint3
     >>> cloth = 0.5 * vertices + [0.0, 0.0, 1.2]  # one metre wide, 1.2 m up
     """
     faces = grid_faces(columns, rows)
+    columns, rows = int(columns), int(rows)  # small numpy integers would overflow
     x = 2.0 * np.arange(columns + 1) / columns - 1.0
     y = 2.0 * np.arange(rows + 1) / rows - 1.0
     vertices = np.stack([np.tile(x, rows + 1), np.repeat(y, columns + 1), np.zeros((rows + 1) * (columns + 1))], axis=1)
@@ -62,7 +63,7 @@ def grid_faces(columns: int, rows: int, *, closed: bool = False, alternate: bool
     Parameters
     ----------
     columns, rows : int
-        Number of cells along both directions.
+        Number of cells along both directions, 1 to 32768; at least 3 if closed.
     closed : bool
         If true, the last column joins the first one and the last row the first one, as on a torus: there are
         columns * rows vertices. If false, there are (columns + 1) * (rows + 1).
@@ -76,15 +77,17 @@ def grid_faces(columns: int, rows: int, *, closed: bool = False, alternate: bool
     Raises
     ------
     TypeError, ValueError
-        If `columns` or `rows` is not an integer in range.
+        If `columns` or `rows` is not an integer in range, or `closed` or `alternate` is not a bool.
 
     Examples
     --------
     >>> grid_faces(1, 1).tolist()
     [[0, 1, 3], [0, 3, 2]]
     """
-    columns = arguments.whole_number("columns", columns, 1, _MOST)
-    rows = arguments.whole_number("rows", rows, 1, _MOST)
+    closed, alternate = arguments.flag("closed", closed), arguments.flag("alternate", alternate)
+    least = 3 if closed else 1  # two cells around would share all their vertices
+    columns = arguments.whole_number("columns", columns, least, _MOST)
+    rows = arguments.whole_number("rows", rows, least, _MOST)
     row, column = np.divmod(np.arange(rows * columns), columns)
     width = columns if closed else columns + 1
     below, right = (row + 1) % rows if closed else row + 1, (column + 1) % columns if closed else column + 1
@@ -221,9 +224,9 @@ def box(size: ArrayLike = (1.0, 1.0, 1.0)) -> tuple[NDArray[np.float64], NDArray
         raise ValueError(f"size: expected shape (3,), lengths along x, y and z, got {lengths.shape}")
     for k in range(3):
         arguments.length(f"size[{k}]", float(lengths[k]))
-    if np.count_nonzero(lengths == 0.0) > 1:
-        raise ValueError(f"size: at most one length may be 0, got {lengths.tolist()}")
     half = lengths / 2
+    if np.count_nonzero(half == 0.0) > 1:
+        raise ValueError(f"size: at most one length may be 0, got {lengths.tolist()}")
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     flat = np.flatnonzero(half == 0.0)

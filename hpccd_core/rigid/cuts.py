@@ -155,7 +155,14 @@ def all_grown(separations: NDArray[np.float64], margins: Sequence[Margin]) -> ND
     -------
     ndarray, shape (K, K), float64
         For :meth:`Detector.set_separations`.
+
+    Raises
+    ------
+    ValueError
+        If there is not one margin for each mesh.
     """
+    if np.shape(separations) != (len(margins), len(margins)):
+        raise ValueError(f"margins: {len(margins)} for separations of shape {np.shape(separations)}; give one a mesh")
     sums = np.array([margin.sum for margin in margins])
     grow = rounding.up(sums[:, None] + sums)  # a sum of two is rounded once, as by fsum
     np.fill_diagonal(grow, 0.0)

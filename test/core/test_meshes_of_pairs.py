@@ -44,12 +44,18 @@ def test_locate(meshes):
 @pytest.mark.parametrize(
     "call, error, words",
     [
-        (lambda s: s.locate(), TypeError, "give vertex or face"),
-        (lambda s: s.locate(0, face=0), TypeError, "give vertex or face"),
+        (lambda s: s.locate(), TypeError, "locate: give either vertex or face"),
+        (lambda s: s.locate(0, face=0), TypeError, "locate: give either vertex or face"),
         (lambda s: s.locate(-1), ValueError, r"vertex: must lie in \[0,"),
         (lambda s: s.locate(1.0), TypeError, "vertex: expected an integer"),
         (lambda s: s.locate(np.array([0, 10**6])), ValueError, "vertex: indices must lie in .* got 0 to 1000000"),
         (lambda s: s.locate(face=np.array([0.5])), TypeError, "face: expected integers, got dtype float64"),
+        (lambda s: s.locate(np.ma.array([1, 2], mask=[0, 1])), TypeError, "vertex: some elements are masked"),
+        (lambda s: s.locate([1, True]), TypeError, "vertex: expected numbers, got True or False"),
+        (lambda s: s.locate([1, None]), TypeError, "vertex: expected integers, got dtype object"),
+        (lambda s: s.locate([1, [2]]), ValueError, "vertex: not a rectangular array"),
+        (lambda s: s.locate([0, 2**70]), ValueError, "vertex: indices must lie in .* got 0 to 1e21"),
+        (lambda s: hc.Scene().locate([1, [2]]), ValueError, "vertex: not a rectangular array"),
     ],
 )
 def test_indices_that_no_mesh_has(meshes, call, error, words):
@@ -142,6 +148,19 @@ def test_a_copied_scene_has_the_same_contacts_and_rules(meshes):
     other.add_mesh("later", [[0, 1, 2]])
     other.ignore_pair(a, b)
     assert repr(scene) == before and hc.Detector(scene).detect(*ends) == expected, "a copy of its own"
+
+
+def test_a_copied_scene_keeps_attributes_that_were_added():
+    class Named(hc.Scene):
+        pass
+
+    scene = Named()
+    scene.add_mesh("cloth", [[0, 1, 2]])
+    scene.unit = "m"
+    assert pickle.loads(pickle.dumps(hc.Scene())).mesh_names == []
+    for other in (copy.copy(scene), copy.deepcopy(scene)):
+        other.add_mesh("later", [[0, 1, 2]])
+        assert type(other) is Named and other.unit == "m" and scene.mesh_names == ["cloth"]
 
 
 def test_a_scene_keeps_its_faces_whatever_the_caller_writes_to_them():

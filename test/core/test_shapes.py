@@ -43,6 +43,12 @@ def test_a_grid_covers_its_square_and_faces_up():
     np.testing.assert_array_equal(faces, hc.shapes.grid_faces(5, 3))
 
 
+def test_small_numpy_integers_do_not_overflow():
+    for size in (np.uint8(255), np.int8(127), np.int16(300)):
+        for given, expected in zip(hc.shapes.grid(size, np.int8(20)), hc.shapes.grid(int(size), 20), strict=True):
+            np.testing.assert_array_equal(given, expected)
+
+
 def test_a_closed_grid_is_a_torus():
     faces = hc.shapes.grid_faces(4, 6, closed=True)
     edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
@@ -59,6 +65,9 @@ def test_a_closed_grid_is_a_torus():
         (lambda: hc.shapes.box(1.0), ValueError, r"size: expected shape \(3,\)"),
         (lambda: hc.shapes.box((1, -1, 1)), ValueError, r"size\[1\]: must be finite and not negative"),
         (lambda: hc.shapes.box((1, 0, 0)), ValueError, "size: at most one length may be 0"),
+        (lambda: hc.shapes.box((1, 0, 5e-324)), ValueError, "size: at most one length may be 0"),
+        (lambda: hc.shapes.grid_faces(2, 3, closed=True), ValueError, r"columns: must lie in \[3, 32768\], got 2"),
+        (lambda: hc.shapes.grid_faces(3, 3, closed="no"), TypeError, "closed: expected True or False"),
     ],
 )
 def test_wrong_sizes_name_the_argument(call, error, words):

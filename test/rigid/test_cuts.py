@@ -48,6 +48,8 @@ def test_errors():
         fewest_parts([], 0.0, 4)
     with pytest.raises(ValueError, match="most"):
         fewest_parts([], 1.0, 0)
+    with pytest.raises(ValueError, match="margins: 1 for separations of shape"):
+        all_grown(np.zeros((2, 2)), [Margin(1.0, 0.0)])
 
 
 def test_separation_grows_by_both_sides_and_upwards():
