@@ -153,7 +153,7 @@ def _wrong(state: str, statuses: dict[str, Status], wait: float) -> list[str]:
             stop = "" if values["cause"] in _WORKING else f"stop is {message}"
         elif level in (DiagnosticStatus.WARN, DiagnosticStatus.ERROR):
             wrong.append(f"{part}: {message}{_REASONS if part == 'frames' else ''}")
-    # Of no use beside its own cause: stop has a line already.
+    # Stop has a line already, which needs no repetition beside its cause.
     return wrong or ([stop] if stop else [])
 
 

@@ -13,10 +13,10 @@ from hpccd_ros.robots.urdf import RobotJoint
 
 # Messages of which none is of use, before it is worth a warning.
 _LEAST = 3
-# Of the width of a joint's limits, by which a position is outside before it is reported: a calibrated encoder reads a
+# Part of the width of a joint's limits by which a position is outside before it is reported: a calibrated encoder reads a
 # little beyond its stop.
 _BEYOND = 0.01
-# Of that width, by which it is outside before its unit is doubted: a little beyond the limits, each angle would be
+# Part of that width by which it is outside before its unit is doubted: a little beyond the limits, each angle would be
 # valid as one in degrees.
 _FAR = 0.5
 # s for which a joint stays reported: a gripper in millimetres is within limits in metres whenever it is closed.

@@ -167,7 +167,7 @@ def undeclared(name: str, known: Iterable[str]) -> str:
     return f"{quoting.shortened(name)}: the node has no such parameter; docs/parameters.md lists all{near}"
 
 
-# Of every node.
+# Parameters of every node.
 _ROS_OWN = ("use_sim_time", "start_type_description_service")
 
 

@@ -49,7 +49,7 @@ _LINKS: tuple = (
 )
 _BASE = (("box", (0.24, 0.24, 0.03), 0.015), ("cylinder", (0.08, 0.12), 0.09))
 _PALM = (("box", (0.05, 0.12, 0.05), 0.03),)
-# Of the visual geometry alone: a cylinder from each joint to the next one, of this radius, by which the links meet.
+# The visual geometry alone has a cylinder of this radius from each joint to the next, so that the links meet.
 _CORES = (0.065, 0.055, 0.05, 0.045, 0.042, 0.036, 0.034, 0.03)
 
 

@@ -75,7 +75,7 @@ def test_a_flipped_bit_is_an_error_or_harmless(bag):
         copy[position] ^= 1 << generator.randrange(8)
         flipped.write_bytes(copy)
         try:
-            # What is not under a check sum: names, times of the index. The messages themselves are.
+            # Names and times of the index are not under a checksum. The messages themselves are.
             assert sorted(_read(flipped)) == sorted(whole)
         except RecordingError as error:
             errors += 1

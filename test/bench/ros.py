@@ -312,7 +312,7 @@ def _rates(link: Link, trial: Callable, seconds: float, guess: float, name: str)
                 rate /= FINER
                 if clean(rate):
                     break
-        # What held for a few seconds need not hold for many.
+        # A result of a few seconds need not hold for many.
         while not clean(rate, seconds) and rate > guess / 8:
             rate /= FINER
         steady = found[-1]
@@ -348,7 +348,7 @@ def _trial(link: Link, status: dds.NodeStatus, pid: int, rate: float, seconds: f
         "answered": after["answered"],
         "dropped": after["dropped"] - after["middleware"],
         "middleware": after["middleware"],
-        # What the node never heard of at the end of a burst leaves no gap in its numbers: it must be missing here.
+        # Messages lost at the end of a burst leave no gap in the node's numbers: they must be missing here.
         "unaccounted": count - after["answered"] - after["dropped"],
         "last_answered": lane.step in lane.came,
         **dds.percentiles("", lane.latencies_ms()),

@@ -306,7 +306,7 @@ class Soak:
     def run(self) -> None:
         self._node = self._session.start_node(self.load.node_parameters())
         self._session.spin_until(self.load.heard, "the node listens")
-        # What came before the node knew of its publisher could not be accounted for.
+        # Messages from before the node knew their publisher cannot be accounted for.
         self.load.send(int(time.time() * self._args.rate))
         self._session.spin_until(self.load.acknowledged, "the first frame acknowledged")
         self._start_publisher()

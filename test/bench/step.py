@@ -75,7 +75,7 @@ class StepRunner(Runner):
         if self._step is not step:
             turns = trials(step) if self.name == TRIAL else [step, elsewhere(step)]
             self._turns = [self.change(turn) for turn in turns] if self.change else turns
-            # Of its contents: a source may make a step again.
+            # The hash of its contents: a source may make a step again.
             self._step, self._key = step, hash((step.vertices_t0.tobytes(), step.vertices_t1.tobytes()))
             self._from_start = 0
             if self.name == TRIAL and self._detector is not None and self._topology == step.topology:

@@ -145,7 +145,7 @@ OTHER = next(simd for simd in ("neon", "avx2") if simd not in hc._core.simd_leve
         (("accuracy", *STRIP, "--simd", OTHER), f"--simd {OTHER}: none of these works here"),
         (("accuracy", "y" * 300), "name a file or a scene"),
         (("cpu", "empty.obj"), "empty.obj"),
-        # What cannot be written is rejected before anything is measured.
+        # A file that cannot be written is rejected before anything is measured.
         (("cpu", *STRIP, "--label", "a/b"), "--label a/b"),
         (("cpu", *STRIP, "--out", "empty.obj/folder"), "--out empty.obj/folder"),
         (("accuracy", *STRIP, "--picture", "/proc/no/x.png"), "--picture: /proc/no/x.png cannot be written"),

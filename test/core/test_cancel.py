@@ -79,7 +79,7 @@ CASES = {
     ]
 }
 
-# Of one snapshot. Distances are asked of meshes whose features are all but equally near, so that much is looked at.
+# Queries of one snapshot. Distances are between meshes whose features are nearly equally far, so many are tested.
 SNAPSHOTS = {
     "proximity": (lambda: soup(10_000, 0.03), lambda detector, points: detector.proximity(points, 0.02)),
     "proximity, last resorts": (lambda: layers(40, 0), lambda detector, points: detector.proximity(points, 1.0)),

@@ -82,5 +82,5 @@ def test_too_many_threads():
 
 
 def test_no_memory_in_threads_that_have_not_thrown_yet():
-    # Of twelve calls one or two lack memory; on a busy machine, now and then none.
+    # One or two of twelve calls lack memory; on a busy machine, now and then none.
     assert any(run(NO_MEMORY)[0] in [f"failed {n}" for n in range(1, 13)] for _ in range(5))

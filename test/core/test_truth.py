@@ -36,7 +36,7 @@ def test_exact(data_folder, name):
 
 @SCENES
 def test_conservative(data_folder, name):
-    # What Tight-Inclusion invents at its tolerance 1e-6 (vertex-face, edge-edge).
+    # False positives of Tight-Inclusion at its tolerance 1e-6 (vertex-face, edge-edge).
     allowed = {"cloth-ball": (2, 3), "n-body": (1, 5), "cloth-funnel": (65, 156)}[name]
     with np.load(data_folder / f"{name}.npz") as truth:
         contacts = detect(truth, "conservative")

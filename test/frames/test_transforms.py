@@ -319,7 +319,7 @@ def test_a_frame_without_any_transform_holds_up_nobody(warned_at_once):
     assert [f.stamp for f, _ in gate.transform(frame(2 * SECOND))] == [2 * SECOND]
     assert gate.waiting == 0 and gate.reasons() == [Reason.NO_TRANSFORM]
     assert "no transform connects 'ghost'" in gate.rejections[0].text and "a later frame" in gate.rejections[0].text
-    # What is only late is waited for, in order, and a ghost between them gives way with the first that is ready.
+    # Late transforms are waited for, in order, and a ghost between them gives way with the first that is ready.
     assert gate.transform(frame(3 * SECOND, "ghost")) == gate.transform(frame(4 * SECOND)) == [] and gate.waiting == 2
     buffer.add("world", "hand", turn(0), 4 * SECOND)
     assert [f.stamp for f, _ in gate.retry()] == [4 * SECOND] and gate.waiting == 0

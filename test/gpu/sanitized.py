@@ -85,7 +85,7 @@ check("places", *sheet, outputs=("points", "normals", "closest"))
 for accuracy in ("fast", "balanced"):
     check("worlds", *device_results.garments(4, n=7), worlds=4, accuracy=accuracy)
 
-# Of one feature more pairs than are ordered by looking at all of them, in one world and in two of three.
+# One feature has more pairs than are ordered by looking at all of them, in one world and in two of three.
 scene, t0, t1 = device_results.needle_through_plates(2100)
 for worlds in (None, 3):
     start, end = (t0, t1) if worlds is None else (np.stack([t0, t0, t1]), np.stack([t1, t0, t0]))

@@ -85,7 +85,7 @@ def test_the_recording_hears_what_the_node_hears(start_node, tmp_path):
     node.peer.node.create_subscription(ContactArray, contacts, heard.append, best_effort)
     node.peer.topology("cloth", sheet_faces(N), N * N)
     node.peer.publisher(MeshVertices, "meshes/cloth/vertices", best_effort)
-    # What is sent at best effort before the node has found its publisher is lost, and nobody hears of it.
+    # Messages sent at best effort before the node has found their publisher are lost without notice.
     while not frames_received(node):
         node.peer.vertices("cloth", sheet_positions(N, 0), 0)
         again = time.monotonic() + 2.0

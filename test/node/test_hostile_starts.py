@@ -18,7 +18,7 @@ HEAD = "/**:\n  ros__parameters:\n"
 MESH = "    meshes: [a]\n    mesh:\n      a:\n        "
 ROBOT = "    robots: [r]\n    robot:\n      r: {pose: [0, 0, 0, 0, 0, 0, 1], "
 
-# What is in the parameter file, the exit status, and a part of the sentence (or of a warning, where the node starts).
+# Content of the parameter file, exit status, and a part of the sentence (or of a warning, where the node starts).
 FILES = {
     "empty": ("", 0, ""),
     "null": ("~\n", 0, ""),

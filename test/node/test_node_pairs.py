@@ -50,7 +50,7 @@ def test_given_changed_and_replayed(start_node, tmp_path, hpccd):
     assert set_parameter(node, "pairs.between.separation", 5e-3).successful  # which was not given at the start
     assert_same_contacts(send(node, 2), frame(1), frame(2), scene(5e-3))
     assert client.contacts_from_message(node.peer.received[-1]).pair_separation == {("cloth", "net"): 5e-3}
-    # What says the same is moved from one way to the other at once.
+    # Equal settings move from one way of writing to the other at once.
     moved = [Parameter("pair_separation", value=["cloth:net:0.002"]), Parameter("pairs.between.separation", value=2e-3)]
     request = SetParametersAtomically.Request(parameters=[parameter.to_parameter_msg() for parameter in moved])
     assert call(node, SetParametersAtomically, "set_parameters_atomically", request).result.successful

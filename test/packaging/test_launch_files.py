@@ -10,14 +10,14 @@ from sources import ROOT
 from hpccd_ros.params.table import NODE_ROWS
 
 FILES = sorted((ROOT / "launch").glob("*.launch.xml"))
-# What launch takes (launch_ros/actions/node.py and launch/actions of Jazzy) and is used here; unknown ones it rejects.
+# Attributes that launch takes (launch_ros/actions/node.py and launch/actions of Jazzy) and is used here; unknown ones it rejects.
 ATTRIBUTES = {
     "launch": set(),
     "arg": {"name", "default", "description"},
     "node": {"pkg", "exec", "name", "namespace", "output", "args"},
     "param": {"name", "value", "from"},
 }
-# Of others, as their sources declare them.
+# Attributes of other elements, as their sources declare them.
 FOREIGN = {
     ("rviz2", "rviz2"): set(),
     ("nav2_lifecycle_manager", "lifecycle_manager"): {"node_names", "autostart", "bond_timeout"},

@@ -12,7 +12,7 @@ from build_tools import ENVIRONMENT, run
 from sources import ROOT
 
 WHEELS = Path(sys.prefix)
-# What only the core needs: CMake stops where one of these is looked for, and remembers that it looked for those.
+# Packages that only the core needs: CMake stops where one of these is looked for, and remembers that it did.
 PACKAGES_OF_THE_CORE = ("pybind11", "GTest", "Threads")
 REMEMBERED = ("BOOST_INCLUDE", "HPCCD_CUDA", "HPCCD_BUILD_TESTS")
 

@@ -186,7 +186,7 @@ def test_only_surfaces_near_a_contact_are_tinted():
     painted = tint.Tint(np.zeros((1, 3)), np.array([[1.0, 0, 0]]), CORNERS).applied(places, own)
     assert painted[0, 0] > painted[1, 0] >= 0.25 and np.array_equal(painted[2], own[2])
     assert tint.Tint(np.empty((0, 3)), np.empty((0, 3)), CORNERS).applied(places, own) is own
-    # Of a step that is much longer than the scene.
+    # The step is much longer than the scene.
     far = tint.Tint(np.array([[1e9, 0, 0], [0, 0, 0.0]]), np.ones((2, 3)), CORNERS)
     assert far.applied(places, own)[0, 0] > 0.25
 

@@ -90,7 +90,7 @@ def test_bodies_and_a_sheet(seed, tolerance):
         for pair, toc in zip(map(tuple, getattr(truth, kind).tolist()), getattr(truth, f"{kind}_toc"), strict=True):
             assert mine[pair] <= toc + 1e-9
 
-    # What is in excess was within twice the bound of the pair.
+    # Spurious contacts were within twice the bound of the pair.
     limit = hc.Detector(scene_of(faces))
     for a in range(3):
         for b in range(a):

@@ -130,7 +130,7 @@ def test_a_continuous_joint_takes_its_followers_the_shorter_way():
     for t in (0.0, 0.4, 1.0):
         true = sampled(kinematics, start, end, "c", body.vertices, t, continuous=True)
         assert np.abs(step.poses(t)["c"].apply(body.vertices) - true).max() < 1e-12
-    # What is no continuous joint goes as its values say.
+    # A joint that is not continuous follows its values.
     revolute = made(HINGE.format(kind="revolute"))
     assert revolute.step(revolute.state(start), revolute.state(end)).joints.speed.tolist() == [0.0, -6.0, -18.0]
 

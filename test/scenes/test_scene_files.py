@@ -98,7 +98,7 @@ def test_parameter_file_names_robots_and_no_links(arm, tmp_path):
 
 def test_mcap_is_the_same_file_each_time_and_names_its_scene(tmp_path):
     scene = scenes.make("two-triangles")
-    # Of one name, which the bag's metadata hold.
+    # The bag's metadata hold one name.
     first, second = (tmp_path / folder / "scene.mcap" for folder in "ab")
     for path in (first, second):
         files.write_mcap(scene, path, rate=30.0)

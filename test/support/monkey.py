@@ -24,7 +24,7 @@ SHUTDOWN = {
     Transition.TRANSITION_INACTIVE_SHUTDOWN,
     Transition.TRANSITION_ACTIVE_SHUTDOWN,
 }
-# What leads on from each state.
+# Calls that leave each state.
 ONWARD = {
     "unconfigured": (Transition.TRANSITION_CONFIGURE,),
     "inactive": (Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_CLEANUP),

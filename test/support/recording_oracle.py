@@ -86,7 +86,7 @@ class Oracle:
         for topology in self.found[f"meshes/{mesh}/topology"]:
             for message in self.found[f"meshes/{mesh}/vertices"] + self.found[f"meshes/{mesh}/points"]:
                 if self._of(mesh, "static", False) or _ns(message.header.stamp) == stamp:
-                    # What cannot be taken apart, neither the node could: it is no frame.
+                    # A message that cannot be parsed is no frame: the node could not parse it either.
                     with contextlib.suppress(ValueError, KeyError, NoTransformError, AttributeError):
                         found += self._placed(mesh, topology, message)
         return found

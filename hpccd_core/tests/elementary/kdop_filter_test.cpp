@@ -95,7 +95,7 @@ TEST_P(KdopFilterTest, LeaveOutOnlyPairsThatAreApart) {
       }
       EXPECT_GT(hits, 10u);
       EXPECT_GT(left_out, 10u);
-      // What each instruction set leaves out is seen in the counts: of the pairs apart in double precision, floats may
+      // The counts show what each instruction set leaves out: of the pairs apart in double precision, floats may
       // miss some; they may find no other.
       std::uint64_t rejected = batch_capacity + 1;
       for (Simd simd : simd_levels()) {
