@@ -13,8 +13,8 @@ from hpccd_ros.robots.urdf import RobotJoint
 
 # Messages of which none is of use, before it is worth a warning.
 _LEAST = 3
-# Part of the width of a joint's limits by which a position is outside before it is reported: a calibrated encoder reads a
-# little beyond its stop.
+# Part of the width of a joint's limits by which a position is outside before it is reported: a calibrated encoder
+# reads a little beyond its stop.
 _BEYOND = 0.01
 # Part of that width by which it is outside before its unit is doubted: a little beyond the limits, each angle would be
 # valid as one in degrees.

@@ -10,7 +10,7 @@ from sources import ROOT
 from hpccd_ros.params.table import NODE_ROWS
 
 FILES = sorted((ROOT / "launch").glob("*.launch.xml"))
-# Attributes that launch takes (launch_ros/actions/node.py and launch/actions of Jazzy) and is used here; unknown ones it rejects.
+# Attributes of launch that are used here (launch_ros/actions/node.py, launch/actions of Jazzy); it rejects others.
 ATTRIBUTES = {
     "launch": set(),
     "arg": {"name", "default", "description"},
