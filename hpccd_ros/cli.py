@@ -72,17 +72,24 @@ def main(argv=None) -> int:
 
 
 class _Interrupts:
-    """Python's handler of SIGINT, which also records the signal; no change if SIGINT is not handled by Python."""
+    """Python's handler of SIGINT, which also records the signal, for SIGTERM and SIGHUP too: by default these would end
+    the process before it removes incomplete files. A signal that is ignored or has another handler keeps that."""
+
+    DEFAULTS = {
+        signal.SIGINT: signal.default_int_handler,
+        signal.SIGTERM: signal.SIG_DFL,
+        signal.SIGHUP: signal.SIG_DFL,
+    }
 
     def __init__(self):
         self.came = False
-        self._ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler
-        if self._ours:
-            signal.signal(signal.SIGINT, self._response)
+        self._ours = {number: before for number, before in self.DEFAULTS.items() if signal.getsignal(number) is before}
+        for number in self._ours:
+            signal.signal(number, self._response)
 
     def close(self):
-        if self._ours:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+        for number, before in self._ours.items():
+            signal.signal(number, before)
 
     def _response(self, number, frame):
         self.came = True

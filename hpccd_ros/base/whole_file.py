@@ -5,6 +5,7 @@ import contextlib
 import errno
 import os
 import shutil
+import stat
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,27 +21,29 @@ def whole_file(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
     """The place to write to. Its content becomes the file `path` when the block ends without an exception.
 
     After an exception, an interrupt included, what was at `path` is unchanged and nothing else is left. The place has
-    the name of `path`, in a hidden folder beside it, so writers that read the format from the name find it. A device or
-    a pipe is written to directly.
+    the name of `path`, in a hidden folder beside it, so writers that read the format from the name find it; a killed
+    process leaves that folder. A device or a pipe is written to directly.
 
     Raises FileExistsError if `path` exists and may not be overwritten. An OSError about the place or a full disk names
     `path`.
     """
     shown = str(path)
     target = Path(os.path.realpath(path))  # a link stays, and its file is replaced
-    if os.path.lexists(target):
-        if not overwrite:
-            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), shown)
-        if target.is_dir():
-            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), shown)
-        if not target.is_file():
-            yield target
-            return
-        if not os.access(target, os.W_OK):
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), shown)
-    folder = None
+    folder = own = None  # own: how names of the place begin in errors
     try:
+        if _is_device(path):
+            own = shown
+            yield Path(path)  # not resolved: what /dev/stdout leads to may have no name
+            return
+        if os.path.lexists(target):
+            if not overwrite:
+                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
+            if target.is_dir():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            if not os.access(target, os.W_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         folder = Path(tempfile.mkdtemp(prefix=f".{target.name[:_SHOWN]}.", suffix=".part", dir=target.parent))
+        own = str(folder)
         draft = folder / target.name
         yield draft
         if overwrite:
@@ -50,8 +53,7 @@ def whole_file(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
         else:
             _move_to_free_name(draft, target)
     except OSError as error:
-        about = str(error.filename or "")
-        if folder is None or about.startswith(str(folder)) or error.errno in FULL:
+        if own is None or str(error.filename or "").startswith(own) or error.errno in FULL:
             error.filename = shown
         raise
     finally:
@@ -59,12 +61,25 @@ def whole_file(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
             shutil.rmtree(folder, ignore_errors=True)
 
 
+def _is_device(path: str | Path) -> bool:
+    """Whether there is something that is neither a file nor a folder."""
+    try:
+        mode = os.stat(path).st_mode
+    except FileNotFoundError:
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
 def _move_to_free_name(draft: Path, target: Path) -> None:
     """Raises FileExistsError if `target` has been made meanwhile."""
     try:
         os.link(draft, target)
-    except FileExistsError:
+    except (FileExistsError, FileNotFoundError):
         raise
     except OSError:  # a file system without hard links
         with open(target, "xb"):
-            os.replace(draft, target)
+            try:
+                os.replace(draft, target)
+            except OSError:
+                os.unlink(target)
+                raise

@@ -146,6 +146,8 @@ def draw(rows: list[dict], path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    from hpccd_ros.picture.contacts import as_bytes
+
     page = Figure(figsize=(10, 4), layout="constrained")
     FigureCanvasAgg(page)
     panels = (
@@ -166,6 +168,6 @@ def draw(rows: list[dict], path: Path) -> None:
     page.legend(marks.values(), marks, loc="outside right center", fontsize=8)
     try:
         with whole_file(path, overwrite=True) as draft:
-            page.savefig(draft, dpi=150)
+            draft.write_bytes(as_bytes(page, draft.suffix, dpi=150))
     except (OSError, ValueError) as error:
         raise UserError(f"--picture {path}: cannot be written: {error}") from error

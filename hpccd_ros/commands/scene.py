@@ -116,7 +116,8 @@ def run(args) -> int:
         exists = f"{error.filename} exists and is not overwritten; remove it or name another"
         raise UserError(exists if error.filename else str(error)) from error
     except (OSError, LookupError) as error:
-        raise UserError(str(error)) from error
+        named = isinstance(error, OSError) and error.filename and error.strerror
+        raise UserError(f"{error.filename}: {error.strerror}" if named else str(error)) from error
     if args.publish:
         from hpccd_ros.scenes.publish import publish
 

@@ -5,7 +5,6 @@ import contextlib
 import os
 import shlex
 import shutil
-import signal
 import sys
 import time
 from pathlib import Path
@@ -35,22 +34,24 @@ WRITTEN = 30.0
 
 def main(args) -> int:
     """Run the demo as the options of `hpccd demo` say."""
-    signal.signal(signal.SIGTERM, _interrupt)
     scene = _scene(args)
     folder = Path(args.out)
     if "ROS_DOMAIN_ID" not in os.environ:
         # A domain of its own: neither the nodes that run here already nor a second demo can mix with it.
         os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)
     console = Console(highlight=False, soft_wrap=True)
-    with contextlib.ExitStack() as stack:
-        try:
+    try:
+        with contextlib.ExitStack() as stack:
             folder.mkdir(parents=True, exist_ok=True)
             drafts = [stack.enter_context(whole_file(folder / name, overwrite=True)) for name in RESULTS]
             for name in LOGS:
                 (folder / name).unlink(missing_ok=True)
-        except OSError as error:
-            raise UserError(f"--out {args.out}: {error.strerror}") from error
-        worst = _run(args, scene, folder, *drafts, console)
+            worst = _run(args, scene, folder, *drafts, console)
+    except OSError as error:
+        place = Path(error.filename or os.devnull)
+        if folder not in (place, *place.parents) and place not in folder.parents:
+            raise  # of another file
+        raise UserError(f"--out {place}: {error.strerror}") from error
     _last_words(folder, console, worst)
     return 0
 
@@ -66,10 +67,6 @@ def _run(args, scene, folder, recording, picture, parameters, console):
     files.write_parameters(scene, parameters)
     _stream(args, scene, folder, recording, parameters, console)
     return _verify_and_draw(args, scene, folder, recording, picture, console)
-
-
-def _interrupt(number, frame):
-    raise KeyboardInterrupt
 
 
 def _scene(args):

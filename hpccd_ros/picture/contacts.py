@@ -2,6 +2,7 @@
 """The picture of one step: shaded meshes, contacts as points coloured by their time, and the step in its context."""
 
 import dataclasses
+import io
 from collections import Counter
 
 import numpy as np
@@ -61,7 +62,15 @@ class History:
 def draw(picture: Picture, path, history: History | None = None, **view) -> None:
     """Write the picture to `path` (PNG, or what else matplotlib writes, by its suffix); view: as compose() takes it."""
     with whole_file(path, overwrite=True) as draft:
-        compose(picture, history, **view).savefig(draft, facecolor=BACKGROUND)
+        draft.write_bytes(as_bytes(compose(picture, history, **view), draft.suffix, facecolor=BACKGROUND))
+
+
+def as_bytes(figure: Figure, suffix: str, **options) -> bytes:
+    """A file of the figure, PNG without a suffix. Not written by matplotlib: its writers of PDF hide the error of a
+    full disk behind one of their own, and add a suffix to a name that has none."""
+    rendered = io.BytesIO()
+    figure.savefig(rendered, format=suffix.removeprefix(".") or "png", **options)
+    return rendered.getvalue()
 
 
 def compose(picture: Picture, history: History | None = None, *, azimuth=-60.0, elevation=26.0, size=(1280, 860)):

@@ -31,7 +31,7 @@ def save(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    from hpccd_ros.picture.contacts import BACKGROUND, INK, INTERSECTING, render
+    from hpccd_ros.picture.contacts import BACKGROUND, INK, INTERSECTING, as_bytes, render
 
     columns = min(3, len(indices))
     rows = -(-len(indices) // columns)
@@ -53,7 +53,7 @@ def save(
             axes.text(0.5, -0.01, what, transform=axes.transAxes, ha="center", va="top", color=INTERSECTING, fontsize=8)
     figure.tight_layout()
     with whole_file(path, overwrite=True) as draft:
-        figure.savefig(draft, facecolor=BACKGROUND)
+        draft.write_bytes(as_bytes(figure, draft.suffix, facecolor=BACKGROUND))
 
 
 def _parts(scene, frame):

@@ -58,7 +58,8 @@ def new_file(option: str, path):
     except OSError as error:
         if error.filename != str(path):
             raise  # of another file
-        raise UserError(f"{option} {path}: {error.strerror or error}; existing files are not overwritten") from error
+        remedy = "; existing files are not overwritten" if isinstance(error, FileExistsError) else ""
+        raise UserError(f"{option} {path}: {error.strerror or error}{remedy}") from error
 
 
 class Table:

@@ -124,6 +124,39 @@ def test_a_pipe_is_written_to_directly(tmp_path):
     assert read == ["streamed"] and _names(tmp_path) == ["pipe"]
 
 
+def test_a_pipe_without_a_name_is_written_to_directly():
+    read, write = os.pipe()
+    with open(read) as reader:
+        for overwrite in (True, False):
+            with whole_file(f"/dev/fd/{write}", overwrite=overwrite) as draft:
+                draft.write_text("streamed\n")
+            assert reader.readline() == "streamed\n"
+        os.close(write)
+    with pytest.raises(OSError) as full, whole_file("/dev/full") as draft:
+        draft.write_text("x")
+    assert (full.value.errno, full.value.filename) == (errno.ENOSPC, "/dev/full")
+
+
+@pytest.mark.parametrize("links", [True, False], ids=["links", "no-links"])
+@pytest.mark.parametrize("overwrite", [True, False])
+def test_a_writer_that_writes_nothing_makes_no_file(tmp_path, monkeypatch, overwrite, links):
+    def no_links(*_):
+        raise OSError(errno.EPERM, "no hard links here")
+
+    if not links:
+        monkeypatch.setattr(module.os, "link", no_links)
+    with pytest.raises(FileNotFoundError) as missing, whole_file(tmp_path / "run.png", overwrite=overwrite):
+        pass
+    assert missing.value.filename == str(tmp_path / "run.png") and _names(tmp_path) == []
+
+
+def test_links_in_a_circle_are_an_error_that_names_the_file(tmp_path):
+    (tmp_path / "run.png").symlink_to("run.png")
+    with pytest.raises(OSError) as circle, whole_file(tmp_path / "run.png", overwrite=True):
+        pytest.fail("nothing is written")
+    assert circle.value.filename == str(tmp_path / "run.png") and _names(tmp_path) == ["run.png"]
+
+
 @pytest.mark.parametrize("name", ["a" * 255, "ü" * 127])
 def test_the_longest_names(tmp_path, name):
     with whole_file(tmp_path / name) as draft:

@@ -13,10 +13,13 @@ import pytest
 from live import PATIENCE
 from sources import ROOT, SOURCES
 
+from hpccd_ros import cli
+
 BAG = str(ROOT / "bags" / "cloth-drop-small.mcap")
 # Commands that replace a file -> the file, and an option that each rejects.
 REPLACED = {
     "view": (("view", BAG, "-o", "run.png"), "run.png", ("--step", "300")),
+    "pdf": (("view", BAG, "-o", "run.pdf"), "run.pdf", ("--step", "300")),
     "sequence": (("view", BAG, "--every", "80", "-o", "run"), "run/000001.png", ("--params", "no.yaml")),
     "page": (("view", BAG, "--html", "run.html"), "run.html", ("--step", "300")),
     "scene": (("scene", "cloth-drop", "--png", "run.png", "--at", "0"), "run.png", ("--at", "900")),
@@ -117,17 +120,25 @@ def test_an_earlier_file_is_rejected(hpccd, folder, case):
     assert _content(folder) == before
 
 
-@pytest.mark.parametrize("case", SLOW)
-def test_an_interrupt_leaves_the_earlier_file(folder, case):
+def _defaults():
+    """A shell's background job ignores SIGINT."""
+    for number, handler in cli._Interrupts.DEFAULTS.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.parametrize(
+    "case, number", [*((case, signal.SIGINT) for case in SLOW), ("csv", signal.SIGTERM), ("mcap", signal.SIGHUP)]
+)
+def test_an_interrupt_leaves_the_earlier_file(folder, case, number):
     arguments, name, *_ = SLOW[case]
     before = _content(folder) if case in NEW else _earlier(folder, name)
-    process = _started(folder, arguments, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler))
+    process = _started(folder, arguments, preexec_fn=_defaults)
     deadline = time.monotonic() + PATIENCE
     # A benchmark measures before it writes.
     while process.poll() is None and not (list(folder.glob(".*.part")) or (case == "bench" and _measures(process))):
         assert time.monotonic() < deadline
         time.sleep(0.005)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     _, said = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130, said
     assert _content(folder) == before
@@ -137,6 +148,21 @@ def _measures(process) -> bool:
     """Whether the process has used more CPU time than its imports take."""
     fields = open(f"/proc/{process.pid}/stat").read().rpartition(")")[2].split()
     return sum(map(int, fields[11:13])) > 4 * os.sysconf("SC_CLK_TCK")
+
+
+@pytest.mark.parametrize("option", ["--csv", "--json", "--html"])
+def test_a_device_is_written_to_and_its_errors_are_the_users(hpccd, folder, option):
+    command = ("view" if option == "--html" else "replay", BAG, option)
+    assert len(hpccd(*command, "/dev/stdout").stdout) > 400
+    full = hpccd(*command, "/dev/full")
+    assert full.returncode == 2 and full.stderr.endswith(f"{option} /dev/full: No space left on device\n")
+    assert [*_content(folder)] == ["run"] and not os.path.exists("/dev/null.png")
+
+
+def test_a_picture_without_a_suffix_is_a_png(hpccd, folder):
+    shutil.rmtree(folder / "run")
+    assert hpccd("view", BAG, "-o", "run").returncode == 0
+    assert [*_content(folder)] == ["run"] and (folder / "run").read_bytes().startswith(b"\x89PNG")
 
 
 def test_rerun_recordings_are_replaced_whole(hpccd, folder):

@@ -186,6 +186,13 @@ def test_wrong_use_leaves_the_results_of_the_run_before(hpccd, tmp_path, wrong, 
     _assert_untouched(out)
 
 
+def test_a_folder_in_the_place_of_a_result_is_named(hpccd, tmp_path):
+    (tmp_path / "out" / "demo.mcap").mkdir(parents=True)
+    done = hpccd("demo", "--out", "out")
+    assert (done.returncode, done.stderr) == (2, "hpccd demo: --out out/demo.mcap: Is a directory\n")
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["demo.mcap"]
+
+
 @pytest.mark.parametrize("installed", ["on the path", "beside python", "as a module", "on the path of make"])
 def test_commands_to_try_next_work_from_where_the_user_is(tmp_path, monkeypatch, installed):
     programs = tmp_path / "some venv" / "bin"
