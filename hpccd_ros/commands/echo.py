@@ -12,7 +12,7 @@ publishers, and the quality of service is what they offer.
 The text has the form of YAML, with a line --- after each message.
 """
 
-from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.errors import UserError, require_utf8
 from hpccd_ros.commands.waiting import add_wait, check_wait
 
 
@@ -29,6 +29,7 @@ def run(args) -> int:
     if args.count is not None and args.count < 1:
         raise UserError(f"-n {args.count}: must be at least 1")
     check_wait(args)
+    require_utf8(args.topic)
     from hpccd_ros.introspection import echo
 
     return echo.main(args)

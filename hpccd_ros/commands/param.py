@@ -13,7 +13,7 @@ A value that the node rejects is not set, and the reason is shown (exit status 2
 parameters and when each can change.
 """
 
-from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.errors import UserError, require_utf8
 from hpccd_ros.commands.waiting import add_wait, check_wait
 
 # Action -> how many of NAME and VALUE it takes, at least and at most.
@@ -37,6 +37,7 @@ def run(args) -> int:
             + {"get": "get NAME", "set": "set NAME VALUE", "list": "list [NAME]"}[args.action]
         )
     check_wait(args)
+    require_utf8(*given)
     from hpccd_ros.introspection import parameter_values
 
     return parameter_values.main(args)

@@ -9,9 +9,11 @@ from typing import Any
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lifecycle_msgs.srv import GetState
-from rclpy.node import Node
+from rclpy.node import Node, NodeNameNonExistentError
 
-from hpccd_ros.base.quoting import counted
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import counted, quoted
+from hpccd_ros.base.version import package_version
 from hpccd_ros.introspection import peer
 from hpccd_ros.middleware import qos
 from hpccd_ros.params import node_parameters
@@ -53,7 +55,13 @@ def _gather(node: Node, name: str, wait: float, stop: Sequence) -> dict[str, Any
     state = answer.current_state.label
     parameters = node_parameters.fetch(node, name, wait, stop)
     statuses = _diagnostics(node, name, wait, stop)
-    return {"node": name, "state": state, **_summary(statuses, parameters), "wrong": _wrong(state, statuses, wait)}
+    try:
+        return {"node": name, "state": state, **_summary(statuses, parameters), "wrong": _wrong(state, statuses, wait)}
+    except (KeyError, ValueError) as error:
+        raise UserError(
+            f"{name}: its /diagnostics are not those of hpccd {package_version()} ({quoted(str(error))}); use the "
+            "hpccd of the node's version, and let no other node publish diagnostics under its name"
+        ) from error
 
 
 def _diagnostics(node: Node, name: str, wait: float, stop: Sequence) -> dict[str, Status]:
@@ -67,7 +75,10 @@ def _diagnostics(node: Node, name: str, wait: float, stop: Sequence) -> dict[str
             if owner == name:
                 found[part] = status.level, status.message, {value.key: value.value for value in status.values}
 
-    published = node.get_publisher_names_and_types_by_node(short, namespace or "/")
+    try:
+        published = node.get_publisher_names_and_types_by_node(short, namespace or "/")
+    except NodeNameNonExistentError as error:
+        raise UserError(f"{name}: the node has ended meanwhile; start it again") from error
     topics = [topic for topic, types in published if _DIAGNOSTICS in types]
     subscriptions = [node.create_subscription(DiagnosticArray, topic, receive, qos.DIAGNOSTICS) for topic in topics]
     deadline = time.monotonic() + wait

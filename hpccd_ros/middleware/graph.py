@@ -67,8 +67,11 @@ def near_topic(node: Node, topic: str, type_name: str) -> str:
 
 
 def no_node(node: Node, remedy: str, wanted: str = "") -> str:
-    """That no node ``wanted`` (full name; "": no hpccd node) is found, which others there are, and the remedy."""
+    """That no node ``wanted`` (full name; "": no hpccd node) is found, which others there are, and the remedy; or that
+    ``wanted`` is no hpccd node."""
     others = other_nodes(node)
+    if wanted in others:
+        return f"node {wanted}: it offers no services of an hpccd node; name another, or wait longer (--wait)"
     there = f" (there are: {listed(others)})" if others else " (no other node is running)"
     near = suggestion(wanted, others) if wanted else ""
     return f"no {f'node {wanted}' if wanted else 'hpccd node'} found on {domain()}{there}; {remedy}{near}"

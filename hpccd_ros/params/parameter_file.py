@@ -67,9 +67,15 @@ def value(text: str) -> Any:
         return text
     if not entries:
         return [""]  # an empty list has no type in ROS
-    if {type(entry) for entry in entries} == {int, float}:
-        return [float(entry) for entry in entries]
-    return found if len({type(entry) for entry in entries}) == 1 else text
+    kinds = {type(entry) for entry in entries}
+    beyond = any(type(entry) is int and not -(2**63) <= entry < 2**63 for entry in entries)
+    if kinds == {int, float} or (beyond and kinds == {int}):
+        try:
+            numbers = [float(entry) for entry in entries]
+        except OverflowError:
+            return text
+        return numbers if isinstance(found, list) else numbers[0]
+    return found if len(kinds) == 1 else text
 
 
 def parameter_value(text: str) -> Any:

@@ -7,10 +7,11 @@ from datetime import datetime
 from pathlib import Path
 
 import rclpy
+from rclpy.exceptions import NameValidationException
 from rclpy.executors import SingleThreadedExecutor
 
 from hpccd_ros.bag.writer import BagWriter
-from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.errors import UserError, require_utf8
 from hpccd_ros.base.quoting import counted
 from hpccd_ros.middleware import environment, ros_start, stop_signals, topic_names
 from hpccd_ros.middleware.message_types import message_class
@@ -31,13 +32,17 @@ def main(args) -> int:
 
 
 def _record_until(stop, target, args) -> int:
+    require_utf8(args.node, *args.topic)
     environment.prepare()
-    ros_start.init(["--ros-args", *args.ros_args] if args.ros_args else None)
+    ros_start.init(["--ros-args", *args.ros_args])
     namespace, _, name = args.node.rpartition("/")
     if not name or not args.node.startswith("/"):
         raise UserError(f"--node {args.node}: give the full name with its namespace, for example /hpccd")
     # In the namespace of the recorded node, so that relative names and remappings mean the same.
-    node = rclpy.create_node(f"{name}_recorder", namespace=namespace or "/", start_parameter_services=False)
+    try:
+        node = rclpy.create_node(f"{name}_recorder", namespace=namespace or "/", start_parameter_services=False)
+    except NameValidationException as error:
+        raise UserError(f"--node {args.node}: not the name of a node; write it as /hpccd or /arm/hpccd") from error
     try:
         return _record(node, target, args, stop)
     finally:

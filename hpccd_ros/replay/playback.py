@@ -42,7 +42,7 @@ def main(args) -> int:
             _print_status(note)
         environment.prepare()
         environment.shorten_heartbeats(Path(folder))  # each topic begins when its first message has arrived
-        ros_start.init(["--ros-args", *args.ros_args] if args.ros_args else None)
+        ros_start.init(["--ros-args", *args.ros_args])
         node = rclpy.create_node("hpccd_replay", start_parameter_services=False)
         try:
             publishers = {topic.name: _publisher(node, topic) for topic in topics}

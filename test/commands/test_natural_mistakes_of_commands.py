@@ -8,6 +8,8 @@ from hpccd_ros import cli
 # Arguments -> a part of the line; BAG stands for a sound recording, PARAMS for a file with a misspelt parameter.
 MISTAKES = {
     ("record", "--node", "hpccd"): "--node hpccd: give the full name with its namespace, for example /hpccd",
+    ("record", "--node", "/my arm/hpccd"): "--node /my arm/hpccd: not the name of a node; write it as /hpccd or ",
+    ("record", "--topic", "/\udcff=std_msgs/msg/String"): "'/\\udcff=std_msgs/msg/String': not UTF-8, as ROS requires",
     ("record", "--duration", "-1"): "--duration -1.0: must not be negative",
     ("record", "--split-size", "1e-6"): "--split-size 1e-06: must be 0 or at least 0.01",
     ("record", "--wait", "0", "--node", "/nobody/hpccd"): "no node /nobody/hpccd found on ROS_DOMAIN_ID ",
@@ -30,10 +32,12 @@ MISTAKES = {
     ("status", "/nobody/hpccd", "--wait", "0"): "no node /nobody/hpccd found on ROS_DOMAIN_ID ",
     ("echo", "/contact", "--wait", "0.1"): "/contact: no such topic on ROS_DOMAIN_ID ",
     ("echo", "meshes/my cloth/vertices"): "'meshes/my cloth/vertices': not a topic name; write it as /contacts or ",
+    ("echo", "/\udcff"): "'/\\udcff': not UTF-8, as ROS requires; write it in UTF-8",
     ("echo", "/contacts", "-n", "0"): "-n 0: must be at least 1",
     ("lifecycle", "get", "--node", "/nobody/hpccd", "--wait", "0"): "no node /nobody/hpccd found on ROS_DOMAIN_ID ",
     ("param", "get"): "get: got no NAME; write hpccd param get NAME",
     ("param", "set", "accuracy"): "set: got accuracy; write hpccd param set NAME VALUE",
+    ("param", "set", "accuracy", "\udcff"): "'\\udcff': not UTF-8, as ROS requires; write it in UTF-8",
     ("param", "list", "accuracy", "fast"): "list: got accuracy fast; write hpccd param list [NAME]",
     ("param", "list", "--node", "/nobody/hpccd", "--wait", "0"): "no node /nobody/hpccd found on ROS_DOMAIN_ID ",
 }

@@ -48,6 +48,7 @@ def test_set(param, name, given, shown):
         (("set", "accuracy", "exakt"), "not set: accuracy: 'exakt' is "),
         (("set", "meshes", "[net]"), "not set: "),
         (("set", "threads", "-1"), "not set: "),
+        (("set", "threads", "99999999999999999999"), "not set: threads: expected int, got float; "),
         (("set", "accuracy", "5"), "not set: accuracy: expected string, got int; docs/parameters.md has the type of "),
         (("set", "outputs", "normals"), "not set: outputs: expected string[], got string; "),
         (("set", "meshes", "[1, 2]"), "not set: meshes: expected string[], got int[]; "),
@@ -80,6 +81,9 @@ def test_rejections(param, node, arguments, says):
         ("[a, 1]", "[a, 1]"),
         ("2026-01-01", "2026-01-01"),
         ("{", "{"),
+        ("99999999999999999999", 1e20),  # beyond an int of ROS
+        ("[1, -99999999999999999999]", [1.0, -1e20]),
+        ("1" + 400 * "0", "1" + 400 * "0"),
         ("", ""),
     ],
 )

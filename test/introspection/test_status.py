@@ -3,8 +3,10 @@
 
 import json
 import os
+import threading
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from sensor_msgs.msg import JointState
 from waving_sheet import sheet_faces, sheet_positions
 
@@ -92,6 +94,40 @@ def test_a_wrong_name_of_a_node(start_node, hpccd):
     assert done.returncode == 2
     assert f"no node {node.namespace}/hpcd found on ROS_DOMAIN_ID {os.environ['ROS_DOMAIN_ID']}" in done.stderr
     assert f"did you mean {node.namespace}/hpccd?" in done.stderr
+
+
+@pytest.mark.parametrize("command", [("status",), ("lifecycle", "get")])
+def test_a_node_that_is_none_of_ours(start_node, hpccd, command):
+    other = f"{start_node({'meshes': ['cloth']}).namespace}/peer"
+    done = hpccd(*command, "--node", other, "--wait", "1")
+    assert done.returncode == 2
+    assert done.stderr.endswith(
+        f": node {other}: it offers no services of an hpccd node; name another, or wait longer (--wait)\n"
+    )
+
+
+@pytest.mark.parametrize("values", [{}, {"rate_hz.cloth": "fast", "cause": ""}])
+def test_diagnostics_of_another_version(start_node, hpccd, values):
+    node = start_node({"meshes": ["cloth"], "diagnostics_period": 60.0})
+    name = f"{node.namespace}/hpccd"
+    entries = [KeyValue(key=key, value=value) for key, value in values.items()]
+    message = DiagnosticArray(
+        status=[DiagnosticStatus(name=f"{name}: {part}", values=entries) for part in ("frames", "stop")]
+    )
+    publisher = node.peer.node.create_publisher(DiagnosticArray, "diagnostics", 10)
+    ended = threading.Event()
+
+    def publish():
+        while not ended.wait(0.02):
+            publisher.publish(message)
+
+    thread = threading.Thread(target=publish)
+    thread.start()
+    done = hpccd("status", name)
+    ended.set()
+    thread.join()
+    assert done.returncode == 2, done.stdout
+    assert f"hpccd status: {name}: its /diagnostics are not those of hpccd " in done.stderr
 
 
 def test_a_robot_without_a_frame(start_node, hpccd, tmp_path):
