@@ -206,8 +206,8 @@ def pair_summary(message: PairSummaryArray, mesh_a: str, mesh_b: str) -> PairSum
 
     Raises
     ------
-    ValueError
-        If there is no such mesh or robot, or its pairs are not tested.
+    TypeError, ValueError
+        If a name is not a string, is of no mesh or robot, or the pair is not tested.
 
     Examples
     --------
@@ -221,9 +221,10 @@ def pair_summary(message: PairSummaryArray, mesh_a: str, mesh_b: str) -> PairSum
     """
     for argument, name in (("mesh_a", mesh_a), ("mesh_b", mesh_b)):
         check(argument, name, (mesh for pair in message.pairs for mesh in (pair.mesh_a, pair.mesh_b)))
-    as_given = [pair for pair in message.pairs if belongs(pair.mesh_a, mesh_a) and belongs(pair.mesh_b, mesh_b)]
-    other_way = [pair for pair in message.pairs if belongs(pair.mesh_a, mesh_b) and belongs(pair.mesh_b, mesh_a)]
-    found = as_given if mesh_a == mesh_b else as_given + other_way
+    as_given = [belongs(pair.mesh_a, mesh_a) and belongs(pair.mesh_b, mesh_b) for pair in message.pairs]
+    other_way = [belongs(pair.mesh_a, mesh_b) and belongs(pair.mesh_b, mesh_a) for pair in message.pairs]
+    # A link with itself, asked for with its robot, is both.
+    found = [pair for pair, *ways in zip(message.pairs, as_given, other_way, strict=True) if any(ways)]
     if not found:
         there = ", ".join(f"{pair.mesh_a} and {pair.mesh_b}" for pair in message.pairs)
         raise ValueError(
@@ -231,7 +232,7 @@ def pair_summary(message: PairSummaryArray, mesh_a: str, mesh_b: str) -> PairSum
         )
     if len(found) == 1 and {found[0].mesh_a, found[0].mesh_b} == {mesh_a, mesh_b}:
         return found[0]
-    first, second = (mesh_a, mesh_b) if as_given else (mesh_b, mesh_a)
+    first, second = (mesh_a, mesh_b) if any(as_given) else (mesh_b, mesh_a)
     return PairSummary(
         mesh_a=first,
         mesh_b=second,

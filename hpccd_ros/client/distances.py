@@ -72,8 +72,8 @@ class DistanceArrays:
 
         Raises
         ------
-        ValueError
-            If there is no such mesh or robot.
+        TypeError, ValueError
+            If a name is not a string, or is of no mesh or robot.
         """
         for argument, name in (("mesh_a", mesh_a), ("mesh_b", mesh_b)):
             check(argument, name, self.mesh_names)

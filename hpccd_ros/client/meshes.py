@@ -122,6 +122,8 @@ def vertices_message(
         raise ValueError(f"vertices: {unusable[1]}")
     if not isinstance(frame_id, str):
         raise TypeError(f"frame_id: expected a string, got {type(frame_id).__name__}")
+    if frame_id:
+        arguments.text("frame_id", frame_id)
     return mesh_messages.vertices_message(
         vertices,
         nanoseconds("stamp_ns", stamp_ns),

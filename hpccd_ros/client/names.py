@@ -12,7 +12,9 @@ def belongs(mesh: str, name: str) -> bool:
 
 
 def check(argument: str, name: str, meshes: Iterable[str]) -> None:
-    """Raises ValueError where no mesh and no robot has this name."""
+    """Raises TypeError for what is no string, ValueError where no mesh and no robot has this name."""
+    if not isinstance(name, str):
+        raise TypeError(f"{argument}: expected a string, the name of a mesh or a robot, got {type(name).__name__}")
     there = list(dict.fromkeys(meshes))
     if not any(belongs(mesh, name) for mesh in there):
         known = [*there, *(mesh.partition("/")[0] for mesh in there)]

@@ -33,7 +33,10 @@ def nanoseconds(name: str, stamp: Stamp) -> int:
     if isinstance(stamp, Time):
         return arguments.whole_number(name, stamp.nanoseconds, 0, LAST_STAMP)
     if isinstance(stamp, TimeMessage):
-        return stamp_to_ns(stamp)
+        try:
+            return stamp_to_ns(stamp)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
     if isinstance(stamp, (float, np.floating)):
         raise TypeError(
             f"{name}: expected an integer, nanoseconds since the epoch, got {type(stamp).__name__} (seconds?); give a "

@@ -68,6 +68,7 @@ def test_a_topology_that_is_rejected(arguments, error, text):
         (dict(step=-1), ValueError, "step: must lie in"),
         (dict(topology_version="1"), TypeError, "topology_version: expected an integer"),
         (dict(frame_id=None), TypeError, "frame_id: expected a string"),
+        (dict(frame_id="\udcff"), ValueError, "frame_id: .* has no UTF-8 encoding"),
     ],
 )
 def test_vertices_that_are_rejected(arguments, error, text):

@@ -4,6 +4,7 @@
 import doctest
 import importlib
 import inspect
+import itertools
 import math
 import pkgutil
 import time
@@ -41,7 +42,7 @@ def test_stamps(stamp):
     [
         (1795815944.9, TypeError, r"stamp_ns: expected an integer, nanoseconds .*got float \(seconds\?\); give a Time"),
         (np.float64(0.5), TypeError, "stamp_ns: expected an integer, nanoseconds .*got float64"),
-        (TimeMessage(sec=-1), ValueError, "sec must not be negative"),
+        (TimeMessage(sec=-1), ValueError, "stamp_ns: stamp has sec -1 .* sec must not be negative"),
         (Time(seconds=2**31), ValueError, "stamp_ns: must lie in"),
         (None, TypeError, "stamp_ns: expected an integer, got NoneType"),
         (True, TypeError, "stamp_ns: expected an integer, got bool"),
@@ -99,6 +100,34 @@ def test_summaries_of_whole_robots(names, expected):
     found = client.pair_summary(summaries(), *names)
     assert (found.mesh_a, found.mesh_b, found.count, found.first_toc) == expected[:4]
     assert found.distance == pytest.approx(expected[4], abs=0, nan_ok=True)
+
+
+def test_summaries_are_those_of_the_pairs_selected_one_by_one():
+    random, meshes = np.random.default_rng(5), ["arm/hand", "arm/elbow", "arm2/hand", "cloth"]
+    is_in = lambda mesh, name: name in (mesh, mesh.partition("/")[0])  # noqa: E731
+    for _ in range(50):
+        pairs = [
+            PairSummary(mesh_a=a, mesh_b=b, count=int(random.integers(9)), first_toc=random.random(), distance=0.5)
+            for k, a in enumerate(meshes)
+            for b in meshes[k:]
+            if random.random() < 0.8
+        ]
+        for x, y in itertools.product(["arm", "arm2", *meshes], repeat=2):
+            chosen = [
+                pair
+                for pair in pairs
+                if any(is_in(pair.mesh_a, a) and is_in(pair.mesh_b, b) for a, b in ((x, y), (y, x)))
+            ]
+            if chosen:
+                found = client.pair_summary(PairSummaryArray(pairs=pairs), x, y)
+                assert {found.mesh_a, found.mesh_b} == {x, y} and found.count == sum(pair.count for pair in chosen)
+                assert found.first_toc == min(pair.first_toc for pair in chosen)
+
+
+@pytest.mark.parametrize("name", [1, None, b"arm"])
+def test_names_that_are_no_strings(name):
+    with pytest.raises(TypeError, match="mesh_b: expected a string, the name of a mesh or a robot, got"):
+        client.pair_summary(summaries(), "arm", name)
 
 
 @pytest.mark.parametrize(
