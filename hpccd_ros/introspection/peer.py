@@ -51,15 +51,18 @@ def hpccd_nodes(node: Node, wait: float, stop: Sequence) -> list[str]:
     """Full names of the hpccd nodes, configured or not. Raises UserError if there is none for ``wait`` s."""
     deadline = time.monotonic() + wait
     asked: dict[str, bool] = {}
-    while not (found := _hpccd_nodes(node, asked, stop)):
-        if time.monotonic() > deadline:
+    settled = None
+    while True:
+        now = time.monotonic()
+        if found := _hpccd_nodes(node, asked, stop):
+            settled = settled or now + SETTLE
+            if now >= settled:
+                return found
+        elif now > deadline:
             raise UserError(graph.no_node(node, _START + graph.elsewhere()))
+        else:  # a node that was found may end again
+            settled = None
         _pause(node, stop)
-    settled = time.monotonic() + SETTLE
-    while time.monotonic() < settled:
-        _pause(node, stop)
-        found = _hpccd_nodes(node, asked, stop)
-    return found
 
 
 def _await_node(node: Node, wanted: str, wait: float, stop: Sequence) -> str:

@@ -3,11 +3,14 @@
 
 import json
 import os
+import subprocess
+import sys
 import threading
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from sensor_msgs.msg import JointState
+from sources import SOURCES
 from waving_sheet import sheet_faces, sheet_positions
 
 from hpccd_ros.middleware import fields
@@ -86,6 +89,37 @@ def test_no_node(hpccd, empty_domain):
     assert done.returncode == 2 and done.stdout == ""
     assert "no hpccd node found on ROS_DOMAIN_ID 101 (no other node is running); start one (hpccd_node" in done.stderr
     assert "set ROS_DOMAIN_ID to that of the node, and ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET" in done.stderr
+
+
+ENDING = """
+import rclpy
+from hpccd.srv import Detect
+from hpccd_ros.introspection import peer
+from hpccd_ros.middleware import environment, graph
+
+environment.prepare()
+context = rclpy.Context()
+rclpy.init(context=context)
+ending = rclpy.create_node("ending", context=context)
+ending.create_service(Detect, "detect", lambda request, response: response)
+
+class Signals(list):
+    def __bool__(self):  # at each look
+        if context.ok() and graph.detects(node, "ending", "/"):
+            ending.destroy_node()
+            context.shutdown()
+            print("found")
+        return False
+
+with peer.peer("status") as (node, _):
+    peer.hpccd_nodes(node, 1.0, Signals())
+"""
+
+
+def test_a_node_that_ends_while_it_is_looked_for(empty_domain):
+    environment = {**os.environ, "PYTHONPATH": SOURCES}
+    done = subprocess.run([sys.executable, "-c", ENDING], capture_output=True, text=True, env=environment, timeout=60)
+    assert done.stdout == "found\n" and "UserError: no hpccd node found on ROS_DOMAIN_ID 101" in done.stderr
 
 
 def test_a_wrong_name_of_a_node(start_node, hpccd):
