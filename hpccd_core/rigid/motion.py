@@ -69,6 +69,13 @@ class Linear:
     start: np.ndarray
     end: np.ndarray
 
+    def __post_init__(self) -> None:
+        shapes = [vertices.shape if isinstance(vertices, np.ndarray) else None for vertices in (self.start, self.end)]
+        if None in shapes:
+            raise TypeError("start, end: expected arrays; convert with numpy.asarray")
+        if shapes[0] != shapes[1]:  # they would be broadcast
+            raise ValueError(f"start, end: expected two arrays of one shape (n, 3), got {shapes[0]} and {shapes[1]}")
+
     def vertices(self, cut: int, parts: int) -> np.ndarray:
         if cut == 0 or self.start is self.end:
             return self.start

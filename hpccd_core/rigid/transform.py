@@ -60,6 +60,7 @@ class Rigid:
 
     def apply(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
         """Transformed vertices, (n, 3) float64. The identity returns the array itself."""
+        vertices = np.asarray(vertices)
         if not self.quaternion[:3].any():
             return vertices + self.shift if self.shift.any() else vertices
         return rotated(self.rotation(), vertices) + self.shift

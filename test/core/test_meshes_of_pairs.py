@@ -181,3 +181,40 @@ def test_outputs_that_were_not_asked_for_break_no_protocol(meshes):
     assert not hasattr(contacts, "normals") and getattr(contacts, "closest", None) is None
     assert repr(contacts).startswith("Contacts(") and pickle.loads(pickle.dumps(contacts)) == contacts
     assert copy.copy(contacts) == contacts and len(contacts.points) == len(contacts)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_sides_and_dicts_in_scenes_with_empty_meshes_points_and_ropes(seed):
+    """The mesh and the index of each vertex and face are listed one by one, as the meshes are added."""
+    random = np.random.default_rng(seed)
+    scene, vertices, faces, sizes = hc.Scene(), [], [], {}
+    for k in range(random.integers(1, 8)):
+        n, kind = int(random.integers(3, 7)), random.integers(5)
+        mesh_faces = [random.choice(n, 3, replace=False) for _ in range(3)] if kind > 2 else []
+        edges = [random.choice(n, 2, replace=False) for _ in range(2)] if kind in (2, 4) else []
+        sizes[name := f"{'aé/☃ '[k % 5]}{k}"] = n = n if kind else 0
+        assert scene.add_mesh(name, mesh_faces, edges=edges, n_vertices=n) == k
+        vertices += [(k, i) for i in range(n)]
+        faces += [(k, i) for i in range(len(mesh_faces))]
+    names = list(sizes)
+    assert [scene.locate(i) for i in range(scene.n_vertices)] == [(names[k], i) for k, i in vertices]
+    assert [scene.locate(face=i) for i in range(scene.n_faces)] == [(names[k], i) for k, i in faces]
+    start, end = random.normal(size=(2, len(vertices), 3))
+    by_mesh = [
+        {names[k]: x[[m == k for m, _ in vertices]] for k in random.permutation(len(names))} for x in (start, end)
+    ]
+    detector, copied = hc.Detector(scene), hc.Detector(pickle.loads(pickle.dumps(scene)))
+    for query, more in (("detect", ()), ("proximity", (0.3,)), ("intersections", ()), ("distances", ())):
+        given = (start, end) if query == "detect" else (start,)
+        found = getattr(detector, query)(*given, *more)
+        assert found == getattr(copied, query)(*by_mesh[: len(given)], *more)
+        if query == "distances":
+            continue
+        vf, ee, ef = found._pairs()
+        sides = [([vertices[v]], [faces[f]]) for v, f in vf]
+        sides += [([vertices[v] for v in row[:2]], [vertices[v] for v in row[2:]]) for row in ee]
+        sides += [([vertices[v] for v in row[:2]], [faces[row[2]]]) for row in ef]
+        for side, mesh, local in ((0, found.mesh_a, found.local_a), (1, found.mesh_b, found.local_b)):
+            expected = [(pair[side][0][0], [i for _, i in pair[side]]) for pair in sides]
+            assert mesh.tolist() == [k for k, _ in expected]
+            assert local.tolist() == [(indices + [NO_INDEX])[:2] for _, indices in expected]

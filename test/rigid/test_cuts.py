@@ -48,6 +48,10 @@ def test_errors():
         fewest_parts([], 0.0, 4)
     with pytest.raises(ValueError, match="most"):
         fewest_parts([], 1.0, 0)
+    with pytest.raises(ValueError, match=r"start, end: .* got \(20, 3\) and \(1, 3\)"):
+        Linear(POINTS, POINTS[:1])
+    with pytest.raises(TypeError, match="start, end: expected arrays"):
+        Linear([[0.0, 0.0, 0.0]], POINTS[:1])
     with pytest.raises(ValueError, match="margins: 1 for separations of shape"):
         all_grown(np.zeros((2, 2)), [Margin(1.0, 0.0)])
 
