@@ -12,7 +12,7 @@ from lifecycle_msgs.srv import GetState
 from rclpy.node import Node, NodeNameNonExistentError
 
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.base.quoting import counted, quoted
+from hpccd_ros.base.quoting import counted, printable, quoted
 from hpccd_ros.base.version import package_version
 from hpccd_ros.introspection import peer
 from hpccd_ros.middleware import qos
@@ -38,12 +38,22 @@ def main(args) -> int:
             names = [peer.chosen(node, args.node, args.wait, stop)]
         else:
             names = peer.hpccd_nodes(node, args.wait, stop)
-        found = [_gather(node, name, args.wait, stop) for name in names]
+        gather = _gather if len(names) == 1 else _gathered
+        found = [gather(node, name, args.wait, stop) for name in names]
     if args.json:
         print(json.dumps(found, indent=2))
     else:
-        print("\n\n".join("\n".join(_lines(one)) for one in found))
+        # Texts come from any process that publishes diagnostics.
+        print("\n\n".join("\n".join(map(printable, _lines(one))) for one in found))
     return 1 if any(one["wrong"] for one in found) else 0
+
+
+def _gathered(node: Node, name: str, wait: float, stop: Sequence) -> dict[str, Any]:
+    """The same as `_gather` for one of several nodes: if it does not respond, the others are shown."""
+    try:
+        return _gather(node, name, wait, stop)
+    except UserError as error:
+        return {"node": name, "state": "unknown", "wrong": [str(error)]}
 
 
 def _gather(node: Node, name: str, wait: float, stop: Sequence) -> dict[str, Any]:
@@ -170,6 +180,8 @@ def _wrong(state: str, statuses: dict[str, Status], wait: float) -> list[str]:
 
 def _lines(found: dict[str, Any]) -> list[str]:
     lines = [f"{found['node']}: {found['state']}"]
+    if "meshes" not in found:
+        return lines + [f"  wrong: {text}" for text in found["wrong"]]
     inputs = [(name, _input_line(mesh)) for name, mesh in found["meshes"].items()]
     inputs += [(name, _robot_line(robot)) for name, robot in found["robots"].items()]
     width = max((len(name) for name, _ in inputs), default=0)

@@ -9,6 +9,7 @@ import threading
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from hpccd.srv import Detect
 from sensor_msgs.msg import JointState
 from sources import SOURCES
 from waving_sheet import sheet_faces, sheet_positions
@@ -133,7 +134,7 @@ def test_a_wrong_name_of_a_node(start_node, hpccd):
 @pytest.mark.parametrize("command", [("status",), ("lifecycle", "get")])
 def test_a_node_that_is_none_of_ours(start_node, hpccd, command):
     other = f"{start_node({'meshes': ['cloth']}).namespace}/peer"
-    done = hpccd(*command, "--node", other, "--wait", "1")
+    done = hpccd(*command, "--node", other, "--wait", "3")
     assert done.returncode == 2
     assert done.stderr.endswith(
         f": node {other}: it offers no services of an hpccd node; name another, or wait longer (--wait)\n"
@@ -142,8 +143,9 @@ def test_a_node_that_is_none_of_ours(start_node, hpccd, command):
 
 @pytest.mark.parametrize("values", [{}, {"rate_hz.cloth": "fast", "cause": ""}])
 def test_diagnostics_of_another_version(start_node, hpccd, values):
-    node = start_node({"meshes": ["cloth"], "diagnostics_period": 60.0})
+    node = start_node({"meshes": ["cloth"], "diagnostics_period": 60.0}, wait=False)  # the only diagnostics are ours
     name = f"{node.namespace}/hpccd"
+    node.wait_until(lambda: "active: " in node.output(), "its start")
     entries = [KeyValue(key=key, value=value) for key, value in values.items()]
     message = DiagnosticArray(
         status=[DiagnosticStatus(name=f"{name}: {part}", values=entries) for part in ("frames", "stop")]
@@ -192,3 +194,15 @@ def test_a_robot_without_a_frame(start_node, hpccd, tmp_path):
     node.wait_until(received, "the message")
     shown = hpccd("status", name).stdout
     assert "  arm   robot, no frame yet, last joint state 7.000000000 s\n" in shown
+
+
+def test_one_of_two_nodes_does_not_respond(start_node, hpccd, empty_domain):
+    """Another process with a service of our type, and without the services of a life cycle."""
+    node = start_node({"meshes": ["cloth"]})
+    service = node.peer.node.create_service(Detect, "detect", lambda request, response: response)
+    try:
+        done = hpccd("status", "--wait", "2")
+    finally:
+        node.peer.node.destroy_service(service)
+    assert done.returncode == 1 and f"{node.namespace}/peer: unknown\n  wrong: " in done.stdout
+    assert f"{node.namespace}/hpccd: active\n" in done.stdout
