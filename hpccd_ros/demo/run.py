@@ -73,7 +73,7 @@ def _scene(args):
     try:
         return scenes.make(args.scene, size=args.size, frames=args.frames, progress=True)
     except ValueError as error:
-        raise UserError(f"{error}; `hpccd scene --list` names them") from error
+        raise UserError(str(error)) from error
 
 
 def _parts(scene):

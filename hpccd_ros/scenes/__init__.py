@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from hpccd_ros.base.quoting import suggestion
 from hpccd_ros.scenes import (
     arm_and_cloth,
     armadillo,
@@ -127,7 +128,7 @@ def make(name: str, size: float = 1.0, frames: int | None = None, seed: int = 0,
     ValueError for a name, size, frame count or seed outside these.
     """
     if name not in _REGISTRY:
-        raise ValueError(f"unknown scene {name!r}; there are {', '.join(names())}")
+        raise ValueError(f"unknown scene {name!r}; there are {', '.join(names())}{suggestion(name, names())}")
     if not MIN_SIZE <= size <= MAX_SIZE:
         raise ValueError(f"size {size!r} is outside {MIN_SIZE} to {MAX_SIZE:g}")
     entry = _REGISTRY[name]

@@ -24,7 +24,7 @@ MISTAKES = {
     ("cut", "BAG", "--to", "1", "-o", "part"): "-o part: must end in .mcap",
     ("cut", "BAG", "--from", "9 s", "-o", "part.mcap"): "--from: '9 s' is not a time; give seconds from the beginning",
     ("doctor", "nothing.mcap"): "nothing.mcap does not exist",
-    ("scene", "cloth-dorp"): "unknown scene 'cloth-dorp'",
+    ("scene", "cloth-dorp"): "; did you mean cloth-drop?",
     ("scene", "two-triangles", "--mcap", "run.bag"): "--mcap run.bag: name a file that ends in .mcap",
     ("scene", "two-triangles", "--loop"): "--loop belongs to --publish",
     ("scene", "two-triangles", "--npz", "x.npz", "--step", "99"): "--step 99: the scene has steps 1 to ",

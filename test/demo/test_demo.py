@@ -172,8 +172,8 @@ def test_a_child_that_fails_is_quoted_and_the_results_of_the_run_before_stay(tmp
         (("--accuracy", "exakt"), "--accuracy exakt: not a tier; did you mean exact?"),
         (("--accuracy", "perfect"), "--accuracy perfect: not a tier; use one of fast, balanced, conservative, exact"),
         (("--threads", "5000"), "--threads 5000: must be from 0 to 1024"),
-        (("--scene", "cloth-dorp"), "unknown scene 'cloth-dorp'"),
-        (("--frames", "1"), "a scene needs a whole number of at least 2"),
+        (("--scene", "cloth-dorp"), "armadillo-like; did you mean cloth-drop?\n"),
+        (("--frames", "1"), "a scene needs a whole number of at least 2\n"),
         (("--features", "faces"), "--features"),
     ],
 )

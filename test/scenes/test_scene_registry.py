@@ -104,6 +104,7 @@ def test_static_meshes_stay_and_all_others_move(name):
     ("arguments", "message"),
     [
         ({"name": "dragon"}, "unknown scene 'dragon'; there are two-triangles"),
+        ({"name": "cloth-dorp"}, "armadillo-like; did you mean cloth-drop?"),
         ({"name": "cloth-drop", "size": 0}, "size 0 is outside"),
         ({"name": "cloth-drop", "size": float("nan")}, "size nan is outside"),
         ({"name": "cloth-drop", "frames": 1}, "frames 1: a scene needs"),
