@@ -8,6 +8,7 @@ from pathlib import Path
 
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import counted
 from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.picture.intersecting import IntersectingFaces
 from hpccd_ros.picture.of_recording import History, draw_step
@@ -104,7 +105,7 @@ def _draw_one(args, steps, target, title, view):
         there = _what_is_there(history, args)
         raise UserError(f"{args.file}: no step {'to show' if args.step is None else args.step}: {there}")
     _draw(chosen, target, history, title=title, **view)
-    print(f"{target}: step {chosen.step}, {chosen.total:,} contacts")
+    print(f"{target}: step {chosen.step}, {counted(chosen.total, 'contact')}")
 
 
 def _draw(step, target, *history, **options):

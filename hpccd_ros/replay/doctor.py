@@ -8,7 +8,7 @@ from hpccd_ros.bag.examine import Examination, examine
 from hpccd_ros.bag.reader import Recording, recording_files
 from hpccd_ros.bag.recover import recover
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.base.quoting import printable
+from hpccd_ros.base.quoting import counted, printable
 
 
 def main(args) -> int:
@@ -57,7 +57,7 @@ def _print_examination(found: Examination) -> None:
     print(f"{found.path}: {_verdict(found)}")
     print(
         f"  {found.size:,} bytes, written by {printable(found.library) or '?'}, "
-        f"profile {printable(found.profile) or '?'}, {found.chunks} chunks, compression {found.compression}"
+        f"profile {printable(found.profile) or '?'}, {counted(found.chunks, 'chunk')}, compression {found.compression}"
     )
     if found.message_count:
         begin = datetime.fromtimestamp(found.start * 1e-9, UTC).strftime("%Y-%m-%d %H:%M:%S")
@@ -68,7 +68,7 @@ def _print_examination(found: Examination) -> None:
         print(f"  readable up to byte {found.readable:,}; the first problem: {printable(found.problem)}")
     if found.damaged_chunks:
         print(
-            f"  {found.damaged_chunks} damaged chunks skipped"
+            f"  {counted(found.damaged_chunks, 'damaged chunk')} skipped"
             + (f", and {found.orphans} messages that only they described" if found.orphans else "")
         )
     if not found.sound and found.message_count:

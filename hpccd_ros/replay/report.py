@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from hpccd_core.options import FEATURES
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import counted
 from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.frames.drops import Reason
 from hpccd_ros.params import unknown
@@ -137,7 +138,9 @@ def main(args) -> int:
                 table.add(step)
             progress.update(bar, completed=replay.messages_read)
             if step.contacts is not None:
-                progress.update(bar, line=f"step {step.step}: {step.total:,} contacts, {step.milliseconds:.1f} ms")
+                progress.update(
+                    bar, line=f"step {step.step}: {counted(step.total, 'contact')}, {step.milliseconds:.1f} ms"
+                )
             if step.difference and args.keep_going:
                 progress.console.print(
                     f"step {step.step} (ends at {step.end} ns): {step.difference}", markup=False, highlight=False
@@ -164,7 +167,7 @@ def line(step: ReplayedStep) -> str:
     if step.missing:
         return f"step {step.step}: not computed: {step.missing}"
     result = step.difference or ("equal" if step.recorded is not None else "nothing recorded to compare with")
-    return f"step {step.step}: {step.total:,} contacts, hash {step.contacts.hash:#018x}, {result}"
+    return f"step {step.step}: {counted(step.total, 'contact')}, hash {step.contacts.hash:#018x}, {result}"
 
 
 class Summary:
@@ -234,7 +237,8 @@ class Summary:
     def print(self, args, recording, replay) -> None:
         wall = time.perf_counter() - self.began
         print(
-            f"{recording.path}: {replay.frames:,} frames, {self.computed:,} steps computed, {self.contacts:,} contacts"
+            f"{recording.path}: {counted(replay.frames, 'frame')}, {counted(self.computed, 'step')} computed, "
+            f"{counted(self.contacts, 'contact')}"
         )
         if self.computed:
             print(

@@ -45,7 +45,7 @@ def test_workflow_runs_targets_that_exist():
 def test_workflow_installs_what_the_page_names(name):
     page = (ROOT / "docs" / "install.md").read_text()
     needed = page.partition("\nYou need ")[2].partition("\n\n")[0]
-    named = " ".join(re.findall(r"`(.+?)`", needed)).split()
+    named = " ".join(re.findall(r"`(.+?)`", needed, re.DOTALL)).split()
     packages = re.findall(r"apt-get install -y (.+)", scripts(load(WORKFLOW)["jobs"][name]))
     assert packages and set(" ".join(packages).split()) <= set(named)
 
