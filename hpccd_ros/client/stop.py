@@ -18,6 +18,8 @@ from hpccd_ros.client.topics import STOP_TIMEOUT, STOP_TOPIC, stop_qos
 
 # Fraction of the time-out, the same in the node: silence reads as true before the time-out is over.
 _IN_TIME = 0.95
+# Times the node's time-out, above which a longer one is reported.
+_FAR_LONGER = 4.0
 # Times per time-out at which a timer checks whether it has passed.
 _LOOKS = 4
 
@@ -76,6 +78,8 @@ class StopListener:
             raise TypeError(f"clock_error: expected seconds, got {type(clock_error).__name__}")
         if not 0 <= clock_error <= 10:
             raise ValueError(f"clock_error: {clock_error} s; give from 0 s to 10 s")
+        if on_change is not None and not callable(on_change):
+            raise TypeError(f"on_change: expected a callable, got {type(on_change).__name__}")
         self._node = node
         self._timeout = float(stop_timeout)
         self._publishers = publishers
@@ -131,11 +135,15 @@ class StopListener:
             if age < -self._clock_error:
                 return f"{self._topic}: the last message was sent {-age:.3g} s in the future"
             if age >= _IN_TIME * self._timeout:
-                return f"{self._topic}: no message was sent in the last {age:.3g} s"
+                return f"{self._topic}: the last message taken was sent {age:.3g} s ago"
             if self._alive is not None and self._alive < self._publishers:
                 return self._too_few(self._alive)
             if self._value:
-                return f"{self._topic} is true"
+                said = f"{self._topic} is true"
+                if (self._alive or 0) <= self._publishers:
+                    return said
+                found, expected = self._alive, self._publishers
+                return f"{said}; it has {found} publishers, of which {expected} were expected (publishers=)"
             several = max(self._publishers, self._alive or 0) > 1
             if several and 1e-9 * (system - self._sent_true) < self._timeout:
                 return f"{self._topic}: one of several publishers said true in the last {self._timeout:g} s"
@@ -165,10 +173,25 @@ class StopListener:
     def _on_liveliness(self, event: Any) -> None:
         with self._lock:
             self._alive = event.alive_count
+        if event.alive_count_change > 0:
+            self._compare_timeouts()
         if event.alive_count < self._publishers:
             self._lose(self._too_few(event.alive_count))
         else:
             self._notify()
+
+    def _compare_timeouts(self) -> None:
+        """Warn where the listener waits much longer than the node promises: 500 is often meant as milliseconds."""
+        promised = [
+            publisher.qos_profile.deadline.nanoseconds
+            for publisher in self._node.get_publishers_info_by_topic(self._topic)
+        ]
+        if promised and self._timeout > _FAR_LONGER * (longest := 1e-9 * max(promised)):
+            node: Any = self._node  # rclpy's get_logger has no types
+            node.get_logger().warning(
+                f"{self._topic}: stop_timeout is {self._timeout:g} s here and {longest:g} s in the node, so a node "
+                f"that hangs is noticed only after {self._timeout:g} s; give the node's stop_timeout, in seconds"
+            )
 
     def _on_incompatible(self, event: Any) -> None:
         self._lose(

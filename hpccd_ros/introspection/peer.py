@@ -39,11 +39,11 @@ def peer(command: str) -> Iterator[tuple[Node, list[int]]]:
 
 def chosen(node: Node, wanted: str, wait: float, stop: Sequence) -> str:
     """The full name of the node ``wanted``; "": of the only hpccd node. Raises UserError."""
-    if wanted:
-        return _await_node(node, wanted, wait, stop)
-    found = hpccd_nodes(node, wait, stop)
+    found = [_await_node(node, wanted, wait, stop)] if wanted else hpccd_nodes(node, wait, stop)
     if len(found) > 1:
         raise UserError(f"several hpccd nodes are running: {', '.join(found)}; name one with --node")
+    if why := graph.same_name(node, found[0]):
+        raise UserError(f"{why}; a node that was killed counts for some seconds")
     return found[0]
 
 

@@ -25,6 +25,7 @@ _REMEDIES = {
 }
 # For frames that were dropped without another cause.
 _REASONS = "; docs/troubleshooting.md has the meaning of each reason"
+_OTHER_MESH = "unknown_mesh"
 # Why stop is true although all is well with the node.
 _WORKING = ("", "near")
 
@@ -174,8 +175,19 @@ def _wrong(state: str, statuses: dict[str, Status], wait: float) -> list[str]:
             stop = "" if values["cause"] in _WORKING else f"stop is {message}"
         elif level in (DiagnosticStatus.WARN, DiagnosticStatus.ERROR):
             wrong.append(f"{part}: {message}{_REASONS if part == 'frames' else ''}")
+    dropped = _by_reason(_values(statuses, "frames"))
+    dropped.pop(_OTHER_MESH, None)  # has a warning of its own
+    if dropped and not int(_values(statuses, "detection").get("detections", 0)):
+        # Diagnostics are about the last period, in which nothing may have come.
+        many = counted(sum(dropped.values()), "message")
+        wrong.append(f"no result so far: {many} dropped{_counts(dropped)}{_REASONS}")
     # Stop has a line already, which needs no repetition beside its cause.
     return wrong or ([stop] if stop else [])
+
+
+def _counts(reasons: dict[str, int]) -> str:
+    """In brackets, if there are any."""
+    return f" ({', '.join(f'{reason} {count:,}' for reason, count in reasons.items())})" if reasons else ""
 
 
 def _lines(found: dict[str, Any]) -> list[str]:
@@ -191,8 +203,7 @@ def _lines(found: dict[str, Any]) -> list[str]:
     latency = found["latency_ms"]
     of_latency = f"; latency {latency['p50']:g} ms (median), {latency['p99']:g} ms (99 %)" if latency else ""
     lines.append(f"  results: {found['results_hz']:g} a second, {found['results']:,} in all{of_latency}")
-    reasons = ", ".join(f"{reason} {count:,}" for reason, count in found["dropped_by_reason"].items())
-    lines.append(f"  dropped: {counted(found['dropped'], 'message')}{f' ({reasons})' if reasons else ''}")
+    lines.append(f"  dropped: {counted(found['dropped'], 'message')}{_counts(found['dropped_by_reason'])}")
     if found["last_rejection"]:
         lines.append(f"  last rejection: {found['last_rejection']}")
     if found["stop"] is not None:

@@ -26,6 +26,14 @@ def other_nodes(node: Node) -> list[str]:
     return sorted({full_name(*one) for one in found if one != own and not one[0].startswith("_")})
 
 
+def same_name(node: Node, full: str) -> str:
+    """That several nodes have this full name, and the remedy; "": one has, or none."""
+    count = sum(full_name(*one) == full for one in node.get_node_names_and_namespaces())
+    if count < 2:
+        return ""
+    return f"{count} nodes are named {full}, so they share topics and services; end one, or rename it (-r __node:=NAME)"
+
+
 def services(node: Node, name: str, namespace: str) -> dict[str, list[str]]:
     """Service -> its types, of a node; none where the node has gone, is not known yet, or is not a ROS node."""
     try:

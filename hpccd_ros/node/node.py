@@ -5,7 +5,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
 from hpccd_ros.detect.step_detector import Detection
-from hpccd_ros.middleware import environment, qos, topic_names
+from hpccd_ros.middleware import environment, graph, qos, topic_names
 from hpccd_ros.node import parameter_services
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.configuration import Configuration
@@ -198,7 +198,10 @@ class HpccdNode(GuardedLifecycleNode):
 
     def _warnings(self) -> list[str]:
         parts = (self._robots, self._stream, self._unknown)
-        return [line for part in parts if part is not None for line in part.warnings()]
+        lines = [line for part in parts if part is not None for line in part.warnings()]
+        if why := graph.same_name(self, self.get_fully_qualified_name()):
+            lines.insert(0, why)
+        return lines
 
     def _errors(self) -> list[str]:
         """Those which the log has as errors."""

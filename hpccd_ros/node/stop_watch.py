@@ -28,6 +28,7 @@ from hpccd_ros.params import robot_parameters
 REPEATS = 4
 LAST_WORD = 0.2  # s for readers to confirm it
 LOG_PERIOD = 1.0  # s
+LONG = 10.0  # s; a longer stop_timeout is reported: 500 is often meant as milliseconds
 # Causes that belong to a node at work; the others are faults, and warnings in the log.
 _EXPECTED = ("", Cause.INACTIVE, Cause.UNANSWERED, Cause.NEAR)
 
@@ -102,6 +103,10 @@ class StopWatch:
         self._node = node
         self._configuration = configuration
         distance, timeout = settings["stop_distance"], settings["stop_timeout"]
+        if timeout > LONG:
+            node.get_logger().warning(
+                f"stop_timeout: {timeout:g} s, so that a publisher that ends is noticed only then; it is in seconds"
+            )
         self._state = StopState(distance, timeout, busy, clock_error=settings["clock_error"])
         self._nearness: Nearness | None = None
         self._nearness_ms = 0.0

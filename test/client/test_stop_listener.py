@@ -122,7 +122,7 @@ def test_silence_is_true(place):
     place.until(lambda: not listener.stop, "false")
     speaker.silent()
     place.until(lambda: listener.stop, "true")
-    silence = ("/stop: no message", "/stop: 0 publishers alive, 1 expected")
+    silence = ("/stop: no message", "/stop: the last message taken", "/stop: 0 publishers alive, 1 expected")
     place.until(lambda: any(words in listener.reason for words in silence), "why")
     speaker.silent(False)
     place.until(lambda: not listener.stop, "false")
@@ -155,7 +155,7 @@ def test_an_executor_that_stands_still(place):
     place.until(lambda: not listener.stop, "false")
     time.sleep(1.5 * TIMEOUT)
     assert listener.stop, "though it was said all the time"
-    assert "/stop: no message was sent in the last" in listener.reason
+    assert "/stop: the last message taken was sent" in listener.reason
     speaker.close()
     time.sleep(1.5 * TIMEOUT)
     seen = []
@@ -221,7 +221,8 @@ def test_several_publishers(place):
         place.spin(0.02)
         assert one.stop and both.stop, "the first, which says false, does not matter"
         reasons.add(one.reason.partition("/stop")[2])
-    assert reasons <= {" is true", ": one of several publishers said true in the last 1 s"}
+    says = " is true; it has 2 publishers, of which 1 were expected (publishers=)"
+    assert reasons <= {says, ": one of several publishers said true in the last 1 s"}
     second.says = False
     place.until(lambda: not one.stop and not both.stop, "false of both again")
     second.close()
@@ -256,3 +257,26 @@ def test_a_publisher_that_promises_less_is_never_heard(place, profile):
 def test_wrong_arguments(place, options, error, text):
     with pytest.raises(error, match=text):
         client.StopListener(place.node, **options)
+
+
+@pytest.mark.parametrize("times, reported", [(3.0, False), (1000.0, True)])
+def test_a_much_longer_timeout_than_the_nodes_is_reported(place, capfd, times, reported):
+    """Milliseconds in place of seconds."""
+    listener = client.StopListener(place.node, stop_timeout=times * TIMEOUT)
+    place.speaker()
+    place.until(lambda: not listener.stop, "false")
+    place.spin(0.2)
+    says = f"/stop: stop_timeout is {times * TIMEOUT:g} s here and {TIMEOUT:g} s in the node, so a node that hangs is "
+    assert (says in capfd.readouterr().err) == reported
+
+
+def test_more_publishers_than_expected_are_in_the_reason(place):
+    listener = place.listener()
+    place.speaker()
+    place.speaker().says = True
+    place.until(lambda: listener.reason.endswith("; it has 2 publishers, of which 1 were expected (publishers=)"), "it")
+
+
+def test_a_callback_that_cannot_be_called(place):
+    with pytest.raises(TypeError, match="on_change: expected a callable, got str"):
+        place.listener(on_change="print")

@@ -79,7 +79,7 @@ CASES = {
     ]
 }
 
-# Queries of one snapshot. Distances are between meshes whose features are nearly equally far, so many are tested.
+# Queries of one snapshot. All features of the meshes are nearly equally far apart, so that distances test most pairs.
 SNAPSHOTS = {
     "proximity": (lambda: soup(10_000, 0.03), lambda detector, points: detector.proximity(points, 0.02)),
     "proximity, last resorts": (lambda: layers(40, 0), lambda detector, points: detector.proximity(points, 1.0)),

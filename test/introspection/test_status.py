@@ -10,6 +10,7 @@ import threading
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from hpccd.srv import Detect
+from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from sources import SOURCES
 from waving_sheet import sheet_faces, sheet_positions
@@ -97,6 +98,7 @@ def test_no_node(hpccd, empty_domain):
 ENDING = """
 import rclpy
 from hpccd.srv import Detect
+from rclpy.node import Node
 from hpccd_ros.introspection import peer
 from hpccd_ros.middleware import environment, graph
 
@@ -202,6 +204,34 @@ def test_a_robot_without_a_frame(start_node, hpccd, tmp_path):
     node.wait_until(received, "the message")
     shown = hpccd("status", name).stdout
     assert "  arm   robot, no frame yet, last joint state 7.000000000 s\n" in shown
+
+
+def test_all_messages_were_rejected_and_the_stream_has_ended(start_node, hpccd):
+    node = start_node({"meshes": ["cloth"]})
+    node.peer.topology("cloth", sheet_faces(N), N * N)
+    for _ in range(4):
+        node.peer.vertices("cloth", sheet_positions(N, 0), 0)
+    node.frames_status(dropped=3)
+    node.wait_until(lambda: "dropped (" not in node.peer.statuses["frames"][1], "a report without new drops")
+    done = hpccd("status", f"{node.namespace}/hpccd")
+    assert done.returncode == 1
+    assert "  wrong: no result so far: 3 messages dropped (stamp_repeated 3); docs/troubleshooting.md" in done.stdout
+
+
+def test_two_nodes_of_one_name(start_node, hpccd):
+    node = start_node({"meshes": ["cloth"]})
+    name = f"{node.namespace}/hpccd"
+    other = Node("hpccd", namespace=node.namespace, context=node.peer.context)
+    try:
+        says = f"2 nodes are named {name}, so they share topics and services; end one, or rename it (-r __node:=NAME)"
+        node.wait_until(lambda: says in node.output(), "the warning")
+        for wait in WAITS:
+            done = hpccd("param", "get", "accuracy", "--node", name, "--wait", str(wait))
+            if done.returncode:
+                break
+        assert done.returncode == 2 and says in done.stderr
+    finally:
+        other.destroy_node()
 
 
 def test_one_of_two_nodes_does_not_respond(start_node, hpccd, empty_domain):
