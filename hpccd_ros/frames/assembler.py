@@ -125,7 +125,7 @@ class FrameAssembler:
             return Outcome(rejections=[rejected_topology(mesh, Reason.TOPOLOGY_CONFLICT, text, topology)])
         current = state.topologies.current
         if current is not None and topology.version == current.version and topology.same_content(current):
-            state.topologies.sent = topology.sent
+            state.topologies.sent, state.topologies.rejected = topology.sent, ""
             return Outcome()
         if current is not None and not new_publisher and (rejection := check_successor(mesh, topology, current)):
             return Outcome(rejections=[rejection])
@@ -139,6 +139,10 @@ class FrameAssembler:
         if placed is not None and not state.positions.frame_ids:
             outcome.unplaced += ((mesh, placed),)
         return outcome
+
+    def topology_rejected(self, mesh: str, why: str) -> None:
+        """Remember for frames that wait why the last message with a topology of ``mesh`` was rejected."""
+        self._meshes[mesh].topologies.rejected = why
 
     def hear(self, mesh: str, received: float) -> None:
         """A message with the position of ``mesh`` was received; if it is static, its current positions are outdated."""
@@ -195,10 +199,12 @@ class FrameAssembler:
         if len(state.early) <= self._max_early:
             return []
         lost = state.early.popleft()
-        version = "" if lost.version is None else f" version {lost.version}"
+        topology = "topology" if lost.version is None else f"topology version {lost.version}"
+        why = state.topologies.rejected
+        lacking = f"no {topology}, as the last one was rejected ({why})" if why else f"{topology} has not arrived"
         text = (
-            f"topology{version} has not arrived; publish it on "
-            f"meshes/{state.name}/topology (reliable, transient local) before the vertices"
+            f"{lacking}; publish {'a valid one' if why else 'it'} on meshes/{state.name}/topology (reliable, transient "
+            "local) before the vertices"
         )
         return [Rejection(state.name, Reason.NO_TOPOLOGY, text, sent=lost.sent)]
 
@@ -281,7 +287,7 @@ def _no_positions(state: _MeshState, frame_id: str) -> str:
     others = ", ".join(map(repr, state.positions.frame_ids))
     there = f" in frame {frame_id!r}, only in {others}" if others else ""
     return (
-        f"static mesh {state.name} has no positions{there} yet; "
+        f"static mesh {state.name} has no valid positions{there} yet; "
         f"publish them once or give a file (parameter mesh.{state.name}.file)"
     )
 

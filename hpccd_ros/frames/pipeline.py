@@ -145,6 +145,10 @@ class FramePipeline:
         """The current topology, or None."""
         return self._assembler.topology(mesh)
 
+    def topology_rejected(self, mesh: str, why: str) -> None:
+        """The last message with a topology of ``mesh`` was rejected."""
+        self._assembler.topology_rejected(mesh, why)
+
     def awaited_transform(self, mesh: str) -> list[str]:
         """Reasons for which frames of ``mesh`` wait, in words; empty: none waits."""
         return self._transformers[mesh].warnings()

@@ -21,6 +21,7 @@ class TopologyHistory:
     def __init__(self, waiting: int) -> None:
         self.current: Topology | None = None
         self.sent = UNKNOWN_TIME  # when the last message with the current topology was sent
+        self.rejected = ""  # why a later topology was
         self._superseded: deque[Topology] = deque(maxlen=_IN_THE_SUBSCRIPTION + waiting)
 
     def put(self, topology: Topology) -> None:
@@ -30,7 +31,7 @@ class TopologyHistory:
         else:
             self._superseded.clear()
         self.current = topology
-        self.sent = topology.sent
+        self.sent, self.rejected = topology.sent, ""
 
     def sent_of(self, topology: Topology) -> int:
         """When it was last sent."""

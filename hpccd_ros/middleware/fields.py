@@ -11,7 +11,7 @@ from array import array
 import numpy as np
 from builtin_interfaces.msg import Time
 
-from hpccd_ros.frames.drops import Aspect, Input, Reason, Rejection
+from hpccd_ros.frames.drops import Input, Reason, Rejection
 
 _NS = 1_000_000_000
 _CODES = {np.dtype(np.float32): "f", np.dtype(np.float64): "d", np.dtype(np.uint32): "I", np.dtype(np.uint8): "B"}
@@ -24,11 +24,9 @@ class InvalidMessageError(ValueError):
         super().__init__(text)
         self.reason = reason
 
-    def rejection(
-        self, mesh: str, what: Input = Input.VERTICES, aspect: Aspect = Aspect.PLACE, sent: int | None = None
-    ) -> Rejection:
+    def rejection(self, mesh: str, what: Input) -> Rejection:
         """The rejection of the message, as one of ``mesh``."""
-        return Rejection(mesh, self.reason, str(self), what=what, aspect=aspect, sent=sent)
+        return Rejection(mesh, self.reason, str(self), what=what)
 
 
 def stamp_to_ns(stamp: Time) -> int:

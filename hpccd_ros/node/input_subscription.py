@@ -88,8 +88,9 @@ class InputSubscription:
             *([f"{self.topic}: {counted(more, 'more such publisher')}"] if more > 0 else []),
         ]
 
-    def why_silent(self, type_name: str) -> str:
-        """Why no message comes, in words, and the remedy; "": `warnings` says it. type_name: of its messages."""
+    def why_silent(self, type_name: str, once: bool = False) -> str:
+        """Why no message comes, in words, and the remedy; "": `warnings` says it. type_name: of its messages. once: one
+        message is enough, and none came so far."""
         found = self._node.get_publishers_info_by_topic(self.topic)
         if not found:
             return f"{self.topic}: it has no publisher; start one, or let it publish on this topic"
@@ -101,10 +102,12 @@ class InputSubscription:
             )
         if all(self._why_unconnected(publisher) for publisher in of_type):
             return ""
-        return (
-            f"{self.topic}: no message for {QUIET:g} s from its publisher {graph.endpoint_node(of_type[0])}; check "
-            "that it still publishes"
-        )
+        publisher = f"from its publisher {graph.endpoint_node(of_type[0])}"
+        if not once:
+            return f"{self.topic}: no message for {QUIET:g} s {publisher}; check that it still publishes"
+        kept = self.subscription.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        remedy = "once is enough" if kept else "messages sent before the node subscribed are not received"
+        return f"{self.topic}: no message so far {publisher}; publish it{'' if kept else ' again'}: {remedy}"
 
     def _why_unconnected(self, publisher: Any) -> str:
         """Why a publisher is not connected, and the remedy; "": it is."""

@@ -11,12 +11,13 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-from hpccd_ros.base.quoting import counted
+from hpccd_ros.base.quoting import counted, shortened
 from hpccd_ros.detect.core import unusable_topology
 from hpccd_ros.frames.arrivals import RateLimit, SequenceWatch
 from hpccd_ros.frames.drops import Aspect, Input, Reason, Rejection
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.taken_inputs import NEW_PUBLISHER, SEVERAL_PUBLISHERS
+from hpccd_ros.frames.types import MeshFrame, PoseFrame, Topology
 from hpccd_ros.frames.welding import Welding
 from hpccd_ros.middleware import executors, mesh_inputs, qos, topic_names
 from hpccd_ros.middleware.fields import InvalidMessageError
@@ -47,6 +48,7 @@ class MeshTopic:
         self.numbers = SequenceWatch()
         self.received = 0  # messages
         self.sent = 0  # when the last message taken was sent
+        self.rejected = ""  # why the last message was; "": it was not
         self._silence = Silence()
         self._limit = RateLimit(reception.settings["max_rate"])
         self._subscription: InputSubscription | None = None
@@ -54,6 +56,7 @@ class MeshTopic:
 
     def taken(self, sent: int, new_publisher: bool, several: bool = False) -> None:
         """A message goes to the pipeline; sent: source timestamp, ns. several: the topic has several publishers."""
+        self.rejected = ""
         flags = NEW_PUBLISHER * new_publisher + SEVERAL_PUBLISHERS * several
         self.reception.accounts.inputs.add(self.relative_name, sent, flags)
 
@@ -99,12 +102,12 @@ class MeshTopic:
         """Publishers that are not connected."""
         return self._subscription.warnings() if self._subscription is not None else []
 
-    def silent(self) -> list[str]:
-        """Why nothing comes, where that has lasted."""
+    def silent(self, once: bool) -> list[str]:
+        """Why nothing comes, where that has lasted. once: as in `why_silent`."""
         # A publisher has its time from when it is found on.
         if self._subscription is None or not self._silence.lasts((self.received, self.publishers)):
             return []
-        why = self._subscription.why_silent(mesh_inputs.TYPE_NAMES[self.kind])
+        why = self._subscription.why_silent(mesh_inputs.TYPE_NAMES[self.kind], once)
         return [why] if why else []
 
     def too_fast(self) -> str | None:
@@ -121,10 +124,25 @@ class MeshTopic:
         """Reject a message that cannot be deserialised, so that the time at which it was sent is unknown."""
         self._reject(Reason.MALFORMED, f"{self.name}: {UNREADABLE}", 1, None)
 
+    def push(self, message: Topology | MeshFrame | PoseFrame, new_publisher: bool) -> None:
+        """Push what the last message contains into the pipeline."""
+        of = self.reception
+        outcome = of.pipeline.push(of.mesh, message, new_publisher)
+        for rejection in outcome.rejections:
+            if (rejection.mesh, rejection.what, rejection.sent) == (of.mesh, self.what, self.sent):
+                self.keep_rejected(rejection)
+        hand_over(outcome, of.pipeline, of.accounts)
+
+    def keep_rejected(self, rejection: Rejection) -> None:
+        """The last message was rejected."""
+        self.rejected = f"{rejection.reason}: {shortened(rejection.text)}"
+
     def _reject(self, reason: Reason, text: str, messages: int, sent: int | None) -> None:
-        self.reception.accounts.rejected(
-            Rejection(self.reception.mesh, reason, text, messages, what=self.what, aspect=self.aspect, sent=sent)
+        rejection = Rejection(
+            self.reception.mesh, reason, text, messages, what=self.what, aspect=self.aspect, sent=sent
         )
+        self.keep_rejected(rejection)
+        self.reception.accounts.rejected(rejection)
 
     @property
     def what(self) -> Input:
@@ -166,13 +184,17 @@ class TopologySubscription(MeshTopic):
         try:
             topology = mesh_inputs.read(self.kind, message, of.settings, sent=info["source_timestamp"])
         except InvalidMessageError as error:
-            of.accounts.rejected(error.rejection(of.mesh, self.what, self.aspect, self.sent))
+            self.reject(error.reason, str(error))
             return
         if why := unusable_topology(topology):
             self.reject(Reason.BAD_TOPOLOGY, why)
             return
         self.taken(info["source_timestamp"], new_publisher)
-        hand_over(of.pipeline.push(of.mesh, topology, new_publisher), of.pipeline, of.accounts)
+        self.push(topology, new_publisher)
+
+    def keep_rejected(self, rejection: Rejection) -> None:
+        super().keep_rejected(rejection)
+        self.reception.pipeline.topology_rejected(self.reception.mesh, self.rejected)
 
 
 class PositionsSubscription(MeshTopic):
@@ -201,12 +223,12 @@ class PositionsSubscription(MeshTopic):
             frame = mesh_inputs.read(self.kind, message, of.settings, received, alone, sent=sent, welding=self._welding)
         except InvalidMessageError as error:
             self.taken(sent, False)  # listed, because a replay reads and rejects it too
-            of.accounts.rejected(error.rejection(of.mesh, aspect=self.aspect, sent=sent))
+            self.reject(error.reason, str(error))
             return
         of.accounts.metrics.stamped(of.mesh, frame.stamp)
         new_publisher = self.numbers.notice()
         self.taken(sent, new_publisher, not alone)
-        hand_over(of.pipeline.push(of.mesh, frame, new_publisher), of.pipeline, of.accounts)
+        self.push(frame, new_publisher)
 
     def _count_received(self, info: dict[str, Any]) -> None:
         of = self.reception
@@ -243,9 +265,11 @@ class MeshSubscriptions:
         self._reception = reception
         self._by_file = bool(values["file"])
         # Kinds of which one message is enough; the topology comes with each message of a whole mesh.
-        self._once = {topic_names.TOPOLOGY}
-        if given_as in (topic_names.POSE, topic_names.BY_TRANSFORMS) or values["static"]:
-            self._once |= {topic_names.VERTICES} if given_as != topic_names.POINTS else {topic_names.POINTS}
+        self._once = set() if given_as in topic_names.WHOLE else {topic_names.TOPOLOGY}
+        if given_as in (topic_names.POSE, topic_names.BY_TRANSFORMS):
+            self._once.add(topic_names.VERTICES)
+        elif values["static"]:
+            self._once.add(given_as)
         self._whole = given_as in topic_names.WHOLE
         self.topics: list[MeshTopic] = []
         self.topics.append(TopologySubscription(reception))
@@ -262,13 +286,21 @@ class MeshSubscriptions:
 
     def silent(self) -> list[str]:
         """Why messages that are needed do not come."""
-        return [line for topic in self.topics if self._needs(topic) for line in topic.silent()]
+        return [line for topic in self.topics if self._needs(topic) for line in topic.silent(topic.kind in self._once)]
+
+    def rejected(self) -> list[str]:
+        """Messages that are sent once and were rejected."""
+        return [
+            f"{topic.name}: the last message was rejected ({topic.rejected}); publish a valid one"
+            for topic in self.topics
+            if topic.rejected and topic.kind in self._once
+        ]
 
     def _needs(self, topic: MeshTopic) -> bool:
         """Whether a message must come: the next one, or the only one."""
         of = self._reception
         if topic.kind == topic_names.TOPOLOGY:
-            return not (self._whole or of.pipeline.topology(of.mesh))
+            return not (self._whole or topic.received or of.pipeline.topology(of.mesh))
         if topic.kind not in self._once:
             return True
         return not (self._by_file or topic.received or topic.relative_name in of.accounts.heard)

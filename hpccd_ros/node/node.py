@@ -203,9 +203,10 @@ class HpccdNode(GuardedLifecycleNode):
             lines.insert(0, why)
         return lines
 
-    def _errors(self) -> list[str]:
-        """Those which the log has as errors."""
-        rejected = self._robots.rejected() if self._robots is not None else []
+    def _rejected(self) -> list[str]:
+        """Inputs that are sent once and were rejected; the log has each already."""
+        parts = (self._robots, self._stream)
+        rejected = [line for part in parts if part is not None for line in part.rejected()]
         return [self._scene_error, *rejected] if self._scene_error else rejected
 
     def _silent(self) -> list[str]:
@@ -220,7 +221,7 @@ class HpccdNode(GuardedLifecycleNode):
             self.get_clock().now().to_msg(),
             state=self.state,
             waiting=self._stream.waiting if self._stream is not None else 0,
-            warnings=[*self._configuration.warnings, *self._errors(), *self._warnings()],
+            warnings=[*self._configuration.warnings, *self._rejected(), *self._warnings()],
             silent=self._silent(),
             service=self._jobs.counts,
             errors=(self.errors.count, self.errors.last),

@@ -70,10 +70,9 @@ class RobotDescriptions:
     def warnings(self) -> list[str]:
         """Robots that are not known, and publishers that are not connected."""
         waiting = [
-            f"robot {name} waits for its description on {full}{self._why(full)}"
-            for name, topic in self._topics.items()
-            if name not in self.robots and name not in self._rejected
-            for full in [self._node.resolve_topic_name(topic)]
+            f"robot {name} waits for its description on {why}"
+            for name, subscription in self._subscriptions.items()
+            if name not in self.robots and name not in self._rejected and (why := self._why_silent(subscription))
         ]
         return waiting + unconnected(self._subscriptions.values())
 
@@ -81,13 +80,14 @@ class RobotDescriptions:
         """Which descriptions cannot be used; the log has each as an error."""
         return [f"robot {name}: {why}" for name, why in self._rejected.items()]
 
-    def _why(self, topic: str) -> str:
-        if not self._node.count_publishers(topic):
-            return (
-                ", which has no publisher; start robot_state_publisher, or name its topic or a URDF file"
-                f"{graph.near_topic(self._node, topic, message_types.DESCRIPTION)}"
-            )
-        return ": its publisher must be latched (reliable, transient local)"
+    def _why_silent(self, subscription: InputSubscription) -> str:
+        topic = subscription.topic
+        if subscription.publishers:
+            return subscription.why_silent(message_types.DESCRIPTION, once=True)
+        return (
+            f"{topic}, which has no publisher; start robot_state_publisher, or name its topic or a URDF file"
+            f"{graph.near_topic(self._node, topic, message_types.DESCRIPTION)}"
+        )
 
     def _read_files(self, name: str) -> None:
         values, given = self._values[name], ""

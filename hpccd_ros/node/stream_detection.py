@@ -166,6 +166,10 @@ class StreamDetection:
         """Which messages have stopped, or have not begun, to come."""
         return self._subscriptions.silent()
 
+    def rejected(self) -> list[str]:
+        """Which messages that are sent once were rejected; the log has each."""
+        return self._subscriptions.rejected()
+
     def _first(self, frame: SceneFrame, stop: StopWatch | None) -> None:
         """Called by the detection thread."""
         if stop is not None:
@@ -222,6 +226,10 @@ class Subscriptions:
     def warnings(self) -> list[str]:
         """Warnings about the publishers."""
         return [line for part in (*self._of_meshes, *self._of_others) for line in part.warnings()]
+
+    def rejected(self) -> list[str]:
+        """Messages that are sent once and were rejected."""
+        return [line for part in self._of_meshes for line in part.rejected()]
 
     def silent(self) -> list[str]:
         """Which messages have stopped, or have not begun, to come; the first few, as each costs a look at the graph."""

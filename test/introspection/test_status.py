@@ -218,6 +218,30 @@ def test_all_messages_were_rejected_and_the_stream_has_ended(start_node, hpccd):
     assert "  wrong: no result so far: 3 messages dropped (stamp_repeated 3); docs/troubleshooting.md" in done.stdout
 
 
+def test_what_is_sent_once_was_rejected(start_node, hpccd):
+    node = start_node({"meshes": ["cloth", "floor"], "mesh.floor.static": True, "pending_frames": 1})
+    node.peer.topology("cloth", sheet_faces(N), 0)
+    node.frames_status(topologies_rejected=1)
+    for k in range(2):
+        node.peer.vertices("cloth", sheet_positions(N, k), k)
+    node.peer.topology("floor", sheet_faces(N), N * N)
+    node.peer.vertices("floor", sheet_positions(N, 0)[1:], 0)
+    node.frames_status(dropped=2)
+    why = "(index_range: face 97 names vertex 63, n_vertices is 0); publish a valid one"
+    assert f"cloth: no_topology: no topology version 0, as the last one was rejected {why}" in node.output()
+    wrong = [
+        f"  wrong: {node.namespace}/meshes/cloth/topology: the last message was rejected {why}\n",
+        f"  wrong: {node.namespace}/meshes/floor/vertices: the last message was rejected (wrong_vertex_count: 63 ",
+    ]
+    node.wait_until(lambda: "dropped (" not in node.peer.statuses["frames"][1], "a report without new drops")
+    shown = hpccd("status", f"{node.namespace}/hpccd").stdout
+    assert all(line in shown for line in wrong) and "/topology: no message" not in shown
+    node.peer.topology("cloth", sheet_faces(N), N * N, version=1)
+    node.peer.vertices("floor", sheet_positions(N, 0), 0)
+    rejected = "the last message was rejected"
+    node.wait_until(lambda: rejected not in str(node.peer.statuses["frames"][2]), "no more of it")
+
+
 def test_two_nodes_of_one_name(start_node, hpccd):
     node = start_node({"meshes": ["cloth"]})
     name = f"{node.namespace}/hpccd"

@@ -15,6 +15,7 @@ from hpccd.msg import MeshTopology, MeshVertices
 from sensor_msgs.msg import JointState, PointCloud2
 from sources import SOURCES, SUPPORT
 from std_msgs.msg import String
+from visualization_msgs.msg import Marker
 from waving_sheet import sheet_faces, sheet_positions
 
 from hpccd_ros.middleware import fields, mesh_messages, qos
@@ -312,6 +313,26 @@ IN_STREAM = {
         CLOTH,
         {"meshes/cloth/vertices": (MeshVertices, RELIABLE, [positions(k) for k in range(1, 50)])},
         "NS/meshes/cloth/topology: it has no publisher; start one",
+    ),
+    "topology-not-sent": Mistake(
+        CLOTH,
+        {
+            "meshes/cloth/topology": (MeshTopology, LATCHED, []),
+            "meshes/cloth/vertices": (MeshVertices, RELIABLE, [positions(k) for k in range(1, 50)]),
+        },
+        "NS/meshes/cloth/topology: no message so far from its publisher of node NS/peer; publish it: once is enough",
+    ),
+    "static-marker-not-sent": Mistake(
+        {"meshes": ["cloth", "floor"], "mesh.floor.static": True, "mesh.floor.input": "marker"},
+        {"meshes/floor/marker": (Marker, RELIABLE, [])},
+        "NS/meshes/floor/marker: no message so far from its publisher of node NS/peer; publish it again: messages sent "
+        "before the node subscribed are not received",
+    ),
+    "description-not-sent": Mistake(
+        {"robots": ["arm"], "frame_id": "world"},
+        {"robot_description": (String, LATCHED, [])},
+        "robot arm waits for its description on NS/robot_description: no message so far from its publisher of node "
+        "NS/peer; publish it: once is enough",
     ),
     "topology-volatile": Mistake(
         CLOTH,
