@@ -155,7 +155,9 @@ def commit(folder: Path) -> str:
     if not top or not (Path(top) / "hpccd_core" / "include" / "hpccd").is_dir():
         return "unknown"
     sources = ("--untracked-files=no", "--", "hpccd_core", "hpccd_ros")
-    changes = "+changes" if _output("git", "-C", top, "status", "--porcelain", *sources) else ""
+    # Without a lock, which an interrupt would leave in the checkout.
+    status = _output("git", "-C", top, "--no-optional-locks", "status", "--porcelain", *sources)
+    changes = "+changes" if status else ""
     return (_output("git", "-C", top, "rev-parse", "--short=10", "HEAD") or "unknown") + changes
 
 

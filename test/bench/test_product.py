@@ -2,6 +2,8 @@
 """`hpccd bench ...`: results, and messages for wrong options."""
 
 import collections
+import os
+import subprocess
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from sources import ROOT
 import hpccd_core as hc
 from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.bench import accuracy, sources
-from hpccd_ros.bench.report import Report
+from hpccd_ros.bench.report import Report, commit
 
 STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", "--repeat", "1")
 SCHEMA = {"benchmark": str, "command": str, "machine": dict, "arguments": dict, "other_processes_share": float}
@@ -28,6 +30,19 @@ def test_cpu(product):
     assert every["stages_ms"]["total"] > 0 and every["candidates"] > every["contacts"]
     assert result["command"] == "hpccd bench cpu folding-strip --size 0.1 --steps 2 --repeat 1 --report all,first,any"
     assert result["machine"]["commit"] and result["machine"]["cores"] >= 1
+
+
+def test_the_commit_is_read_without_writing_to_the_checkout(tmp_path):
+    header = tmp_path / "hpccd_core" / "include" / "hpccd" / "scene.h"
+    header.parent.mkdir(parents=True)
+    header.touch()
+    for words in ("init -q", "add .", "-c user.name=n -c user.email=e commit -qm subject"):
+        subprocess.run(["git", "-C", tmp_path, *words.split()], check=True)
+    os.utime(header, (0, 0))  # git would note the new time in its index, under a lock
+    index = (tmp_path / ".git" / "index").read_bytes()
+    assert len(commit(header.parent)) == 10 and (tmp_path / ".git" / "index").read_bytes() == index
+    header.write_text("changed")
+    assert commit(header.parent).endswith("+changes")
 
 
 def test_a_recording_and_a_mesh_file(product, tmp_path):
