@@ -44,7 +44,7 @@ def main(args) -> int:
 def _set(node: Node, remote: str, args, stop: Sequence) -> None:
     value = parameter_file.value(args.value)
     given = Parameter(args.name, value=value).to_parameter_msg()
-    (answer,) = node_parameters.call(
+    (response,) = node_parameters.call(
         node,
         SetParameters,
         f"{remote}/set_parameters",
@@ -53,7 +53,7 @@ def _set(node: Node, remote: str, args, stop: Sequence) -> None:
         remote=remote,
         stop=stop,
     )
-    (result,) = answer.results
+    (result,) = response.results
     if not result.successful:
         raise UserError(f"not set: {result.reason or f'{remote} gives no reason'}")
     print(f"{args.name}: {_yaml(value)}")

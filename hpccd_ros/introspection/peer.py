@@ -16,7 +16,7 @@ from hpccd_ros.params.table import STOP_ROWS
 
 # s that further nodes have to be found once there is one.
 SETTLE = 0.5
-# s for a node to answer which parameters it has.
+# s for a node to list its parameters.
 PATIENCE = 2.0
 _START = "start one (hpccd_node --ros-args --params-file FILE), or "
 
@@ -95,12 +95,12 @@ def _has_our_parameters(node: Node, full: str, stop: Sequence) -> bool:
     deadline = time.monotonic() + PATIENCE
     service = f"{full}/list_parameters"
     try:
-        (answer,) = node_parameters.call(
+        (response,) = node_parameters.call(
             node, ListParameters, service, [ListParameters.Request()], deadline=deadline, remote=full, stop=stop
         )
-    except UserError:  # it does not answer: nothing is known of it
+    except UserError:  # it does not respond: nothing is known of it
         return False
-    return {row.name for row in STOP_ROWS} <= set(answer.result.names)
+    return {row.name for row in STOP_ROWS} <= set(response.result.names)
 
 
 def _pause(node: Node, stop: Sequence) -> None:

@@ -60,10 +60,10 @@ def _gathered(node: Node, name: str, wait: float, stop: Sequence) -> dict[str, A
 def _gather(node: Node, name: str, wait: float, stop: Sequence) -> dict[str, Any]:
     """All that is shown of a node, as plain values."""
     deadline = time.monotonic() + wait
-    (answer,) = node_parameters.call(
+    (response,) = node_parameters.call(
         node, GetState, f"{name}/get_state", [GetState.Request()], deadline=deadline, remote=name, stop=stop
     )
-    state = answer.current_state.label
+    state = response.current_state.label
     parameters = node_parameters.fetch(node, name, wait, stop)
     statuses = _diagnostics(node, name, wait, stop)
     try:
