@@ -11,7 +11,9 @@ import signal
 import sys
 
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import listed, nearest, quoted
 from hpccd_ros.base.version import package_version
+from hpccd_ros.commands.asking import node_named
 
 COMMANDS = {
     "demo": "see it work: node, moving scene and recorder as separate processes, then a picture",
@@ -96,22 +98,57 @@ class _Interrupts:
         raise KeyboardInterrupt
 
 
+class _Parser(argparse.ArgumentParser):
+    """Rejects unknown words with its own usage and the likely remedy. By default a subcommand's parser leaves them to
+    that of `hpccd`, which knows neither the usage nor the options of the subcommand."""
+
+    # From this similarity on (difflib, 0 .. 1) a word is taken for a misspelt one: 0.67 for `set` and `get`.
+    NEAR = 0.7
+
+    def __init__(self, **options):
+        # No abbreviations: a script that says --acc would change its meaning when an option is added.
+        super().__init__(**options, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False)
+        self._given = []
+
+    def parse_known_args(self, args=None, namespace=None):
+        self._given = args
+        namespace, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            file = "-o" in self._option_string_actions and not unknown[0].startswith("-") and not node_named(unknown)
+            meant = f"; did you mean -o {unknown[0]}?" if file else ""
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{meant}")
+        return namespace, unknown
+
+    def _check_value(self, action, value):
+        if action.choices is not None and value not in action.choices:
+            choices = list(action.choices)
+            near = nearest(value, choices, self.NEAR) or next((word for word in self._given if word in choices), "")
+            meant = f"; did you mean {near}?" if near else ""
+            raise argparse.ArgumentError(
+                action, f"invalid choice: {quoted(value)}; use one of {', '.join(choices)}{meant}"
+            )
+
+    def error(self, message):
+        options = self._option_string_actions
+        unknown = [word.partition("=")[0] for word in self._given if word.startswith("--")]
+        near = listed(near for word in unknown if word not in options and (near := nearest(word, options, self.NEAR)))
+        meant = f"; did you mean {near}?" if near else ""
+        if "--node" in options and (node := node_named(self._given)):
+            meant += f"; name the node with --node {node}"
+        super().error(message + meant)
+
+
 def _run(argv, asked) -> int:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="hpccd",
         description="Continuous collision detection of deforming triangle meshes, with a ROS 2 node.",
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
     )
     parser.add_argument("-V", "--version", action="version", version=f"hpccd {package_version()}")
     subparsers = parser.add_subparsers(dest="command", metavar="<command>", required=True)
     run = None
     for name, summary in COMMANDS.items():
-        # No abbreviations: a script that says --acc would change its meaning when an option is added.
-        subparser = subparsers.add_parser(
-            name, help=summary, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
-        )
+        subparser = subparsers.add_parser(name, help=summary)
         if name == asked:
             module = importlib.import_module(f"hpccd_ros.commands.{name}")
             subparser.description = module.__doc__

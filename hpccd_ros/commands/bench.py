@@ -10,7 +10,6 @@
 Close other programs first; the result includes the load of the machine.
 """
 
-import argparse
 import importlib
 
 BENCHMARKS = {
@@ -23,7 +22,7 @@ BENCHMARKS = {
 def configure(parser):
     subparsers = parser.add_subparsers(dest="benchmark", metavar="<benchmark>", required=True)
     for name, summary in BENCHMARKS.items():
-        subparser = subparsers.add_parser(name, help=summary, formatter_class=argparse.RawDescriptionHelpFormatter)
+        subparser = subparsers.add_parser(name, help=summary)
         module = importlib.import_module(f"hpccd_ros.bench.{name}")
         subparser.description = module.__doc__
         module.configure(subparser)

@@ -13,7 +13,7 @@ The text has the form of YAML, with a line --- after each message.
 """
 
 from hpccd_ros.base.errors import UserError, require_utf8
-from hpccd_ros.commands.waiting import add_wait, check_wait
+from hpccd_ros.commands.asking import add_wait, check_wait
 
 
 def configure(parser):

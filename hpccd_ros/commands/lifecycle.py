@@ -11,13 +11,13 @@ Exit status: 0 done, 1 the transition failed (the node's log says why), 2 the st
 is found.
 """
 
-from hpccd_ros.commands.waiting import add_wait, check_wait
+from hpccd_ros.commands.asking import add_node, add_wait, check_wait
 
 
 def configure(parser):
     actions = ("get", "configure", "activate", "deactivate", "cleanup", "shutdown")
     parser.add_argument("action", choices=actions, help="get, or a transition")
-    parser.add_argument("--node", default="", metavar="NODE", help="full name (default: the only hpccd node)")
+    add_node(parser)
     add_wait(parser, "the node")
 
 

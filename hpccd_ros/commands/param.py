@@ -14,7 +14,7 @@ parameters and when each can change.
 """
 
 from hpccd_ros.base.errors import UserError, require_utf8
-from hpccd_ros.commands.waiting import add_wait, check_wait
+from hpccd_ros.commands.asking import add_node, add_wait, check_wait, node_named
 
 # Action -> how many of NAME and VALUE it takes, at least and at most.
 _ACTIONS = {"get": (1, 1), "set": (2, 2), "list": (0, 1)}
@@ -24,12 +24,14 @@ def configure(parser):
     parser.add_argument("action", choices=_ACTIONS, help="what to do")
     parser.add_argument("name", nargs="?", metavar="NAME", help="of a parameter; of list: its beginning")
     parser.add_argument("value", nargs="?", metavar="VALUE", help="of set, in YAML")
-    parser.add_argument("--node", default="", metavar="NODE", help="full name (default: the only hpccd node)")
+    add_node(parser)
     add_wait(parser, "the node")
 
 
 def run(args) -> int:
     given = [text for text in (args.name, args.value) if text is not None]
+    if node := node_named(given[:1]):
+        raise UserError(f"{args.action}: {node} is no parameter; name the node with --node {node}")
     least, most = _ACTIONS[args.action]
     if not least <= len(given) <= most:
         raise UserError(

@@ -11,7 +11,7 @@ Waits for the next message of the node on /diagnostics, by default at most a sec
 Exit status: 0 nothing is wrong, 1 something is wrong, 2 no node is found.
 """
 
-from hpccd_ros.commands.waiting import add_wait, check_wait
+from hpccd_ros.commands.asking import add_wait, check_wait
 
 
 def configure(parser):

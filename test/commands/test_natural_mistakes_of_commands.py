@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mistakes that users make with the commands: each is answered in one line, with the problem and its remedy."""
 
+import itertools
+
 import pytest
 
 from hpccd_ros import cli
+from hpccd_ros.commands import bench
 
 # Arguments -> a part of the line; BAG stands for a sound recording, PARAMS for a file with a misspelt parameter.
 MISTAKES = {
@@ -39,20 +42,40 @@ MISTAKES = {
     ("param", "set", "accuracy"): "set: got accuracy; write hpccd param set NAME VALUE",
     ("param", "set", "accuracy", "\udcff"): "'\\udcff': not UTF-8, as ROS requires; write it in UTF-8",
     ("param", "list", "accuracy", "fast"): "list: got accuracy fast; write hpccd param list [NAME]",
+    ("param", "get", "/hpccd", "accuracy"): "get: /hpccd is no parameter; name the node with --node /hpccd\n",
+    ("param", "set", "/arm/hpccd", "accuracy"): "name the node with --node /arm/hpccd\n",
+    ("param", "list", "/hpccd"): "list: /hpccd is no parameter; name the node with --node /hpccd\n",
     ("param", "list", "--node", "/nobody/hpccd", "--wait", "0"): "no node /nobody/hpccd found on ROS_DOMAIN_ID ",
 }
-# Arguments -> a part of what argparse says below the usage.
+# Arguments -> a part of the line below the usage; a word may be unknown to `hpccd`, or to the command.
 OF_OPTIONS = {
-    ("rekord",): "invalid choice: 'rekord'",
-    ("replay",): "the following arguments are required: FILE",
-    ("replay", "a.mcap", "--rte", "2"): "unrecognized arguments: --rte",
+    ("rekord",): "argument <command>: invalid choice: 'rekord'; use one of ",
+    ("rekord", "-o", "a.mcap"): "; did you mean record?\n",
+    ("topic", "echo", "/contacts"): "; did you mean echo?\n",
+    ("--verison",): "; did you mean --version?\n",
+    ("replay",): "the following arguments are required: FILE\n",
+    ("replay", "a.mcap", "--rte", "2"): "unrecognized arguments: --rte 2; did you mean --rate?\n",
+    ("view", "a.mcap", "--stp=1"): "unrecognized arguments: --stp=1; did you mean --step?\n",
+    ("view", "a.mcap", "--frame", "9"): "unrecognized arguments: --frame 9\n",
+    ("view", "a.mcap", "a.png"): "unrecognized arguments: a.png; did you mean -o a.png?\n",
+    ("cut", "a.mcap", "--otput", "b.mcap"): "are required: -o/--output; did you mean --output?\n",
     ("scene", "--size", "big"): "argument --size: invalid float value: 'big'",
-    ("record", "--compression", "gzip"): "invalid choice: 'gzip'",
+    ("record", "drop.mcap"): "unrecognized arguments: drop.mcap; did you mean -o drop.mcap?\n",
+    ("record", "/arm/hpccd"): "unrecognized arguments: /arm/hpccd; name the node with --node /arm/hpccd\n",
+    ("record", ""): "unrecognized arguments: ",
+    ("record", "--compression", "gzip"): "invalid choice: 'gzip'; use one of none, lz4, zstd\n",
+    ("record", "--compression", "zst"): "; did you mean zstd?\n",
     ("view", "a.mcap", "--step", "1", "--every", "2"): "not allowed with argument",
-    ("status", "--nod", "/hpccd"): "unrecognized arguments: --nod",
+    ("status", "--nod", "/hpccd"): "unrecognized arguments: --nod; did you mean --node?\n",
     ("status", "/hpccd", "--node", "/hpccd"): "not allowed with argument",
     ("lifecycle", "start"): "invalid choice: 'start'",
+    ("lifecycle", "set", "activate"): "invalid choice: 'set'; use one of get, configure, ",
+    ("lifecycle", "set", "/hpccd", "activate"): "; did you mean activate?; name the node with --node /hpccd\n",
+    ("lifecycle", "/hpccd", "activate"): "; name the node with --node /hpccd\n",
     ("param", "put", "accuracy", "fast"): "invalid choice: 'put'",
+    ("param", "set", "/hpccd", "minimum_separation", "0.1"): "arguments: 0.1; name the node with --node /hpccd\n",
+    ("bench", "cpu", "--repet", "3"): "; did you mean --repeat?\n",
+    ("bench", "cup"): "invalid choice: 'cup'; use one of cpu, gpu, accuracy",
 }
 
 
@@ -72,4 +95,6 @@ def test_mistake_of_options(arguments, capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main(list(arguments))
     shown = capsys.readouterr().err
-    assert ended.value.code == 2 and OF_OPTIONS[arguments] in shown and shown.startswith("usage: hpccd")
+    assert ended.value.code == 2 and OF_OPTIONS[arguments] in shown
+    of = itertools.takewhile(lambda word: word in cli.COMMANDS or word in bench.BENCHMARKS, arguments)
+    assert shown.startswith(f"usage: {' '.join(['hpccd', *of])} [-h]")
