@@ -35,7 +35,7 @@ class Contacts(WithSides, PairsOfWorlds):
     ee_toc : ndarray, shape (M,), float64
         Time of impact of each row of `ee`.
     first_toc : float
-        The earliest time of impact; +inf if there are no contacts.
+        The earliest time of impact; +inf if there are no contacts. With report="any", that of the one contact reported.
     hash : int
         64-bit; the same for the same contacts on any backend and with any number of threads.
     outputs : dict of str to ndarray

@@ -83,7 +83,7 @@ class Detector(
     threads : int
         Number of CPU threads; 0 for all cores.
     report : {"all", "first", "any"}
-        All contacts, those at the earliest time of impact, or the first one found.
+        All contacts, those at the earliest time of impact, or any one, not necessarily the earliest.
     outputs : iterable of {"points", "normals", "closest"}
         What to compute for each contact beside its features and its time of impact.
     minimum_separation : float

@@ -37,10 +37,10 @@ class MotionQueries(Generic[MotionResult, StepResult]):
         Parameters
         ----------
         vertices_t0, vertices_t1 : Positions, shape (V, 3), float32 or float64
-            Positions of all vertices at both ends of the step: one array, meshes concatenated in the order added, or
-            a dict {mesh name: (n, 3) array}. With W worlds, (W, V, 3). C-contiguous arrays are read in place, also in
-            a GPU's memory (CUDA array interface or DLPack, backend "gpu" or "auto"). Coordinates up to 1e150 in
-            motions, 1e300 in queries of one snapshot.
+            Positions, not displacements, of all vertices at both ends of the step: one array, meshes concatenated in
+            the order added, or a dict {mesh name: (n, 3) array}. With W worlds, (W, V, 3). C-contiguous arrays are
+            read in place, also in a GPU's memory (CUDA array interface or DLPack, backend "gpu" or "auto").
+            Coordinates up to 1e150 in motions, 1e300 in queries of one snapshot.
         stream : Stream, optional
             CUDA stream that wrote the device arrays; by default all work on the device comes first. The result is
             complete when the call returns.
@@ -68,6 +68,7 @@ class MotionQueries(Generic[MotionResult, StepResult]):
         Parameters
         ----------
         vertices_t0, vertices_t1 : Positions, shape (V, 3)
+            Both are positions: for a direction of motion give vertices_t0 + direction.
         stream : Stream, optional
 
         Returns
