@@ -74,8 +74,8 @@ class MotionQueries(Generic[MotionResult, StepResult]):
         Returns
         -------
         float, or ndarray of shape (W,) with worlds
-            In [0, 1]; 1.0 if there is no contact, 0.0 if there is one at the start. "exact" and "conservative": never
-            larger than the true earliest time of impact, at most 1e-9 smaller.
+            In [0, 1]: 1.0 only if there is no contact, not even at the end; 0.0 if there is one at the start. "exact"
+            and "conservative": never larger than the true earliest time of impact, at most 1e-9 smaller.
 
         Notes
         -----

@@ -263,7 +263,9 @@ std::vector<double> Detector::collision_free_steps(Positions t0, Positions t1) {
   impl_->check(t0, t1);
   std::vector<double> first = impl_->ask(
       t0, t1, [](DetectionBackend& backend, Positions a, Positions b, Counts&) { return backend.earliest(a, b); });
-  for (double& time : first) time = std::min(time, 1.0);
+  // A whole step would end in contact if one comes at its end.
+  constexpr double just_before_the_end = 1 - 0x1p-53;
+  for (double& time : first) time = time > 1 ? 1 : std::min(time, just_before_the_end);
   return first;
 }
 

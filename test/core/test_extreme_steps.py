@@ -71,9 +71,28 @@ def test_already_touching_and_all_on_one_point(accuracy):
     meshes.vertices_t0[:] = 1.0
     assert assert_true(meshes, accuracy) == 0.0
     meshes.vertices_t0, meshes.vertices_t1 = meshes.vertices_t1, meshes.vertices_t0
-    assert assert_true(meshes, accuracy) == 1.0, "at the very end"
+    assert assert_true(meshes, accuracy) == np.nextafter(1.0, 0), "at the very end"
     meshes.vertices_t1 = meshes.vertices_t0.copy()
     assert assert_true(meshes, accuracy) == 1.0
+
+
+@pytest.mark.parametrize("separation", [0.0, 0.25])
+@pytest.mark.parametrize("accuracy", ["exact", "conservative", "balanced", "fast"])
+def test_contact_exactly_at_the_end(accuracy, separation):
+    """The whole step would end in contact, from which no later one is free; 0.9 of what is free ends apart."""
+    scene = hc.Scene()
+    scene.add_mesh("falling", [[0, 1, 2]])
+    scene.add_mesh("ground", [[0, 1, 2]], static=True)
+    start = np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1], [-5, -5, 0], [5, -5, 0], [0, 5, 0]], float)
+    end = start.copy()
+    end[:3, 2] = separation
+    options = {"accuracy": accuracy, "minimum_separation": separation, "backend": "cpu"}
+    detector = hc.Detector(scene, **options)
+    step = detector.collision_free_step(start, end)
+    assert 1 - 1e-9 <= step < 1
+    assert len(detector.detect(start, end)) and not len(detector.detect(start, start + 0.9 * step * (end - start)))
+    steps = hc.Detector(scene, worlds=2, **options).collision_free_step(np.stack([start] * 2), np.stack([end, start]))
+    assert steps.tolist() == [step, 1.0]
 
 
 @TIERS

@@ -91,7 +91,7 @@ class _Asked:
         return is_alone(alone, feature, every) and self._is_free(step, alone.first_toc)
 
     def _is_free(self, step: float, first_toc: float) -> bool:
-        earliest = min(first_toc, 1.0)
+        earliest = min(first_toc, np.nextafter(1.0, 0)) if first_toc <= 1 else 1.0
         return earliest - EARLY <= step <= earliest if self._promised else step == earliest
 
     def _with(self, separation: float, report: str, features: tuple[str, ...] = FEATURES) -> hc.Detector:

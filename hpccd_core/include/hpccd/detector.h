@@ -52,7 +52,8 @@ class HPCCD_API Detector {
 
   /// The largest part of the motion, in [0, 1], that is certainly free of contacts, whatever Options::report is. At the
   /// tiers exact and conservative it never exceeds the true time of impact and is at most 1e-9 smaller; at the others
-  /// it is the earliest time found. 1 without contacts. For several worlds, the minimum of all.
+  /// it is the earliest time found. 1 only without contacts: less if one comes at the end. For several worlds, the
+  /// minimum of all.
   double collision_free_step(Positions vertices_t0, Positions vertices_t1);
   /// The same for each world.
   std::vector<double> collision_free_steps(Positions vertices_t0, Positions vertices_t1);
