@@ -68,7 +68,10 @@ def _rejection(node: Node, given: Parameter) -> SetParametersResult | None:
     elif not node.has_parameter(given.name):
         reason = values.undeclared(given.name, node.list_parameters([], 0).names)
     elif wrong := _wrong_type(node.describe_parameter(given.name), _as_declared(node, given).value.type):
-        reason = f"{given.name}: {wrong}"
+        row = values.row_of(given.name)
+        example = row and values.example(row)
+        remedy = f"write, for example, {example}" if example else "docs/parameters.md has the type of each parameter"
+        reason = f"{given.name}: {wrong}; {remedy}"
     else:
         return None
     return SetParametersResult(successful=False, reason=reason)
@@ -77,7 +80,7 @@ def _rejection(node: Node, given: Parameter) -> SetParametersResult | None:
 def _wrong_type(wanted: ParameterDescriptor, given: int) -> str:
     if given in (wanted.type, ParameterType.PARAMETER_NOT_SET) or wanted.dynamic_typing:
         return ""
-    return f"expected {_WORDS[wanted.type]}, got {_WORDS[given]}; docs/parameters.md has the type of each parameter"
+    return f"expected {_WORDS[wanted.type]}, got {_WORDS[given]}"
 
 
 def _as_declared(node: Node, given: Parameter) -> Parameter:

@@ -6,16 +6,19 @@ over that of its robot. The links of a robot are known once its description has 
 its links) has known robots, and settings of others have no effect yet.
 """
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
 from hpccd_core.options import ACCURACIES, FEATURES
-from hpccd_ros.base.quoting import listed, quoted, suggestion
+from hpccd_ros.base.quoting import listed, quoted, shortened, suggestion
 from hpccd_ros.detect.separation import Separation
 from hpccd_ros.params.table import FARTHEST, PAIRS
 from hpccd_ros.params.values import ParameterError
+
+_NO_COLONS = re.compile(r"\s*[,;\s]\s*")
 
 
 @dataclass(frozen=True)
@@ -51,7 +54,7 @@ def ignored_pairs(
         if not _are_names(settings, pair) or (pair[0] == pair[1] and pair[0] not in settings["robots"]):
             raise ParameterError(
                 f"ignored_pairs: {quoted(text)} must be NAME:NAME with two different meshes out of {_names(settings)}"
-                f"{_meant(settings, pair)}"
+                f"{_meant(settings, pair, text)}"
             )
         given.append(_PairSetting("ignored_pairs", text, pair, True))
     for one in _structured(settings, "ignored"):
@@ -80,7 +83,7 @@ def pair_accuracies(settings: dict[str, Any], links: Links = NO_LINKS) -> tuple[
         if not _are_names(settings, names) or tier not in ACCURACIES:
             raise ParameterError(
                 f"pair_accuracy: {quoted(text)} must be NAME:NAME:TIER with meshes out of {_names(settings)} "
-                f"and a tier out of {', '.join(ACCURACIES)}{_meant(settings, names)}"
+                f"and a tier out of {', '.join(ACCURACIES)}{_meant(settings, names, text)}"
             )
         given.append(_PairSetting("pair_accuracy", text, tuple(names), tier))
     agreed = _agreed([*given, *_structured(settings, "accuracy")])
@@ -96,7 +99,7 @@ def pair_features(settings: dict[str, Any], links: Links = NO_LINKS) -> tuple[tu
         if not _are_names(settings, names) or kind not in FEATURES:
             raise ParameterError(
                 f"pair_features: {quoted(text)} must be NAME:NAME:KIND with meshes out of {_names(settings)} "
-                f"and a kind out of {', '.join(FEATURES)}{_meant(settings, names)}"
+                f"and a kind out of {', '.join(FEATURES)}{_meant(settings, names, text)}"
             )
         texts, _, kinds = listed_kinds.setdefault(frozenset(names), ([], tuple(names), set()))
         texts.append(text)
@@ -118,7 +121,7 @@ def separation(settings: dict[str, Any], links: Links = NO_LINKS) -> Separation:
         if not _are_names(settings, names) or distance is None:
             raise ParameterError(
                 f"pair_separation: {quoted(text)} must be NAME:NAME:DISTANCE with meshes out of {_names(settings)} "
-                f"and a distance from 0 to {FARTHEST:g}{_meant(settings, names)}"
+                f"and a distance from 0 to {FARTHEST:g} in the unit of the vertices{_meant(settings, names, text)}"
             )
         given.append(_PairSetting("pair_separation", text, tuple(names), distance))
     agreed = _agreed([*given, *_structured(settings, "separation")])
@@ -218,8 +221,10 @@ def _is_name(settings: dict[str, Any], name: str) -> bool:
     return name in settings["meshes"] or (name.partition("/")[0] in settings["robots"] and not name.endswith("/"))
 
 
-def _meant(settings: dict[str, Any], names: Sequence[str]) -> str:
-    """The end of a message: the name that is spelled most like the first unknown one."""
+def _meant(settings: dict[str, Any], names: Sequence[str], text: str = "") -> str:
+    """The end of a message: ``text`` with colons, or the name that is spelled most like the first unknown one."""
+    if ":" not in text and (colons := _NO_COLONS.sub(":", text)) != text:
+        return f"; did you mean {shortened(colons)}?"
     unknown = next((name for name in names if not _is_name(settings, name)), None)
     return "" if unknown is None else suggestion(unknown, [*settings["meshes"], *settings["robots"]])
 

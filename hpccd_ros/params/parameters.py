@@ -99,7 +99,7 @@ def _declare_one(node: Node, row: Row, name: str) -> Any:
     except ParameterUninitializedException:
         value = None if given is not None else row.default  # an empty list in YAML is no value of any type
     except InvalidParameterTypeException as error:
-        raise ParameterError(f"{name}: {quoting.shortened(error, 300)}; {expected(row)}") from error
+        raise ParameterError(f"{name}: {quoting.quoted(given.value)} is of the wrong type; {expected(row)}") from error
     except InvalidParameterValueException as error:
         raise ParameterError(f"{name}: {quoting.shortened(error, 300)}; allowed {allowed(row)}") from error
     return usable(row, name, value)

@@ -18,7 +18,7 @@ class Row:
 
     ``span``: closed range of a number; ``least``: smallest value besides ``span[0]``, which means off; ``choices``:
     allowed strings (of each entry). ``change``: ALWAYS; UNCONFIGURED: only while the node is unconfigured, because it
-    is read when the node is configured; NEVER: read-only.
+    is read when the node is configured; NEVER: read-only. ``example``: for messages, where the default is none.
     """
 
     name: str
@@ -30,6 +30,7 @@ class Row:
     least: float | None = None
     choices: tuple[str, ...] = ()
     change: str = UNCONFIGURED
+    example: Any = None
 
 
 # Smallest files of a split recording: smaller ones would contain one message each, and opening a file takes a few
@@ -51,6 +52,7 @@ SCENE_ROWS = (
         "Names of robots. Each link with geometry is a mesh ROBOT/LINK, after those of `meshes`; each name "
         "has parameters robot.NAME.*",
         change=NEVER,
+        example=["arm"],
     ),
     Row(
         "meshes",
@@ -59,6 +61,7 @@ SCENE_ROWS = (
         "Names of the meshes of the scene, in the order of scene-wide indices. Each name has topics "
         "meshes/NAME/... and parameters mesh.NAME.*",
         change=NEVER,
+        example=["cloth"],
     ),
     Row(
         "ignored_pairs",
@@ -66,12 +69,14 @@ SCENE_ROWS = (
         [],
         "Pairs of meshes that are not tested against each other, as NAME:NAME. The name of a robot means all "
         "its links, here and in all parameters of pairs",
+        example=["cloth:floor"],
     ),
     Row(
         "pair_accuracy",
         "string[]",
         [],
         "Pairs of meshes with another tier, as NAME:NAME:TIER. The same name twice: within that mesh",
+        example=["cloth:floor:fast"],
     ),
     Row(
         "pair_features",
@@ -79,6 +84,7 @@ SCENE_ROWS = (
         [],
         "Pairs of meshes with other features, as NAME:NAME:KIND, where KIND is vertex_face or edge_edge. Two "
         "entries for a pair: both kinds. The same name twice: within that mesh",
+        example=["cloth:floor:edge_edge"],
     ),
     Row(
         "autostart",
@@ -123,6 +129,7 @@ DETECTION_ROWS = (
         "Additional arrays of each contact: contact points, normals, nearest points of both sides",
         choices=OUTPUTS,
         change=ALWAYS,
+        example=["points"],
     ),
     Row(
         "minimum_separation",
@@ -134,6 +141,7 @@ DETECTION_ROWS = (
         unit="unit of the vertices",
         span=(0.0, FARTHEST),
         change=ALWAYS,
+        example=0.01,
     ),
     Row(
         "pair_separation",
@@ -141,6 +149,7 @@ DETECTION_ROWS = (
         [],
         "Pairs of meshes with another separation, as NAME:NAME:DISTANCE. The same name twice: within that mesh",
         change=ALWAYS,
+        example=["cloth:floor:0.01"],
     ),
     Row(
         "distances",
@@ -375,6 +384,7 @@ RECORDING_ROWS = (
         span=(0.0, MOST_SPLIT),
         least=LEAST_SPLIT_SIZE,
         change=ALWAYS,
+        example=512.0,
     ),
     Row(
         "record_split_time",
@@ -385,6 +395,7 @@ RECORDING_ROWS = (
         span=(0.0, MOST_SPLIT),
         least=LEAST_SPLIT_TIME,
         change=ALWAYS,
+        example=60.0,
     ),
     Row(
         "record_flush",
@@ -409,6 +420,7 @@ STOP_ROWS = (
         span=(-1.0, FARTHEST),
         least=0.0,
         change=ALWAYS,
+        example=0.05,
     ),
     Row(
         "stop_timeout",
@@ -454,6 +466,7 @@ PAIR_ROWS = (
         "string[]",
         [],
         "The two meshes of the pair; the same name twice: within that mesh. A new NAME is only read at the start",
+        example=["cloth", "floor"],
     ),
     Row("accuracy", "string", "", "Tier, instead of `accuracy`; empty: that one", choices=ACCURACIES),
     Row(
@@ -464,6 +477,7 @@ PAIR_ROWS = (
         unit="unit of the vertices",
         span=(0.0, FARTHEST),
         change=ALWAYS,
+        example=0.01,
     ),
     Row(
         "features",
@@ -471,8 +485,9 @@ PAIR_ROWS = (
         [],
         "Pairs of features that are tested, instead of `features`; empty: those",
         choices=FEATURES,
+        example=["edge_edge"],
     ),
-    Row("ignored", "bool", None, "Do not test the pair; not set: as in `ignored_pairs`"),
+    Row("ignored", "bool", None, "Do not test the pair; not set: as in `ignored_pairs`", example=True),
 )
 
 MESH_ROWS = (
@@ -548,6 +563,7 @@ ROBOT_ROWS = (
         "With `joint_states`: placement of the root link in the scene, translation x y z, unit quaternion x y"
         " z w; empty: the transform from `frame_prefix` + ROOT to `frame_id`",
         unit="unit of the vertices",
+        example=[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
     ),
     Row(
         "tolerance",

@@ -77,7 +77,8 @@ def _in_section(first: str, rest: str, settings: dict[str, Any]) -> str:
     names, keys = settings[parameter], [row.name for row in rows]
     owner, _, key = rest.partition(".")
     if not key:
-        return f"no parameter; write {first}.NAME.KEY, with a KEY out of {', '.join(keys)}"
+        meant = "" if rest else f"; did you mean {parameter}?"
+        return f"no parameter; write {first}.NAME.KEY, with a KEY out of {', '.join(keys)}{meant}"
     if owner not in names:
         near = nearest(owner, names)
         meant = f"; did you mean {first}.{near}.{shortened(key)}?" if near else ""

@@ -50,7 +50,22 @@ def normalise(row: Row, value: Any) -> Any:
 
 def expected(row: Row) -> str:
     """The type, with an example."""
-    return f"expected {row.kind}" + (f", e.g. {row.default!r}" if row.default is not None else "")
+    return f"expected {row.kind}" + (f", e.g. {text}" if (text := example(row)) else "")
+
+
+def example(row: Row) -> str:
+    """A value in YAML, with its unit; "": a text of any kind."""
+    value = row.default if row.example is None else row.example
+    text = str(value).lower() if row.kind == "bool" else repr(value)
+    return "" if value in (None, "") else f"{text} ({row.unit})" if row.unit else text
+
+
+def row_of(name: str) -> Row | None:
+    """The row of the parameter with this full name."""
+    section, _, _ = name.partition(".")
+    rows = {"mesh": MESH_ROWS, ROBOT: ROBOT_ROWS, PAIRS: PAIR_ROWS}.get(section, NODE_ROWS)
+    key = name if rows is NODE_ROWS else name.rpartition(".")[2]
+    return next((row for row in rows if row.name == key), None)
 
 
 def allowed(row: Row) -> str:

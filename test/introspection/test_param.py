@@ -49,7 +49,13 @@ def test_set(param, name, given, shown):
         (("set", "meshes", "[net]"), "not set: "),
         (("set", "threads", "-1"), "not set: "),
         (("set", "threads", "99999999999999999999"), "not set: threads: expected int, got float; "),
-        (("set", "accuracy", "5"), "not set: accuracy: expected string, got int; docs/parameters.md has the type of "),
+        (("set", "accuracy", "5"), "not set: accuracy: expected string, got int; write, for example, 'exact'"),
+        (
+            ("set", "minimum_separation", "1mm"),
+            "minimum_separation: expected float, got string; write, for example, 0.01 (unit of the vertices)",
+        ),
+        (("set", "mesh.cloth.frame", "5"), "expected string, got int; docs/parameters.md has the type of "),
+        (("set", "mesh.cloth.pose", "5"), "got int; write, for example, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] ("),
         (("set", "outputs", "normals"), "not set: outputs: expected string[], got string; "),
         (("set", "meshes", "[1, 2]"), "not set: meshes: expected string[], got int[]; "),
         (

@@ -46,6 +46,8 @@ REJECTED = {
     "hyphen": (CLOTH | {"minimum-separation": 0.1}, "did you mean minimum_separation?"),
     "singular": (TWO | {"ignored_pair": ["cloth:ball"]}, "did you mean ignored_pairs?"),
     "mesh-instead-of-meshes": ({"mesh": ["cloth"]}, "mesh: no parameter; write mesh.NAME.KEY, with a KEY out of input"),
+    "mesh-for-meshes": ({"mesh": ["cloth"]}, "transform, frame, pose; did you mean meshes?"),
+    "robot-for-robots": ({"robot": "arm"}, "pose, tolerance; did you mean robots?"),
     "meshes-instead-of-mesh": (
         {"meshes.cloth.file": "cloth.obj"},
         "meshes.cloth.file: meshes is a parameter, not a section of others; did you mean mesh.cloth.file?",
@@ -101,7 +103,13 @@ REJECTED = {
         "features: 'edge-edge' is not valid; use one of vertex_face, edge",
     ),
     "type": (CLOTH | {"threads": "all"}, "threads: "),
-    "text-for-a-list": ({"meshes": "cloth"}, "expected string[]"),
+    "text-for-a-list": ({"meshes": "cloth"}, "meshes: 'cloth' is of the wrong type; expected string[], e.g. ['cloth']"),
+    "unit-of-a-distance": (
+        TWO | {"stop_distance": "5cm"},
+        "stop_distance: '5cm' is of the wrong type; expected float, e.g. 0.05 (unit of the vertices)",
+    ),
+    "unit-of-a-time": (TWO | {"stop_timeout": "500ms"}, "expected float, e.g. 0.5 (s)"),
+    "comma-in-a-pair": (TWO | {"ignored_pairs": ["cloth, ball"]}, "out of cloth, ball; did you mean cloth:ball?"),
     "quaternion-missing": (
         CLOTH | {"mesh.cloth.transform": "pose", "mesh.cloth.pose": [0.0, 0.0, 1.0]},
         "mesh.cloth.pose: ",

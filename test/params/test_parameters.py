@@ -46,6 +46,9 @@ def test_each_row_is_sound(row):
     if row.choices:
         value = ["nonsense"] if row.kind == "string[]" else "nonsense"
         assert "nonsense" in values.unusable_value(row, value)
+    example = values.example(row)
+    assert (example or row.kind == "string") and row.unit in example
+    assert row.example is None or values.unusable_value(row, row.example) is None
 
 
 def test_defaults(node_with):
@@ -71,6 +74,8 @@ def test_overrides_reach_the_settings(node_with):
         ({"meshes": ["a", "b"], "ignored_pairs": ["a:c"]}, "ignored_pairs: 'a:c'"),
         ({"meshes": ["a", "b"], "ignored_pairs": ["a"]}, "ignored_pairs: 'a'"),
         ({"meshes": ["cloth", "ball"], "ignored_pairs": ["cloth:bal"]}, "out of cloth, ball; did you mean ball?"),
+        ({"meshes": ["cloth", "ball"], "ignored_pairs": ["cloth,ball"]}, "ball; did you mean cloth:ball?"),
+        ({"meshes": ["cloth", "ball"], "pair_accuracy": ["cloth ball fast"]}, "; did you mean cloth:ball:fast?"),
         ({"meshes": ["cloth", "ball"], "pair_features": ["coth:ball:edge_edge"]}, "edge_edge; did you mean cloth?"),
         ({"meshes": ["cloth", "ball"], "pair_accuracy": ["ball:Cloth:fast"]}, "exact; did you mean cloth?"),
         ({"meshes": ["a", "b"], "pair_accuracy": ["a:b"]}, "pair_accuracy: 'a:b' must be NAME:NAME:TIER"),
