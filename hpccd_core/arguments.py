@@ -8,9 +8,9 @@ import inspect
 import math
 import operator
 import struct
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain
-from typing import TYPE_CHECKING, Any, SupportsIndex, TypeVar
+from typing import TYPE_CHECKING, Any, SupportsIndex, TypeGuard, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,11 +110,20 @@ def length(name: str, value: object) -> float:
     return number
 
 
+def separation(value: object) -> float:
+    """The last argument of set_separation as float."""
+    if isinstance(value, str):
+        raise TypeError("separation: expected a number, got str; write set_separation(mesh_a, mesh_b, separation)")
+    return length("separation", value)
+
+
 def real(name: str, value: Any) -> float:
     """The value as float. Raises ValueError if float64 cannot hold it exactly."""
     if isinstance(value, np.float32):
         return float(widened(np.asarray(value)))
     if isinstance(value, bool) or not (_is_integer(value) or isinstance(value, (float, np.floating))):
+        if type(value) is np.ndarray and value.ndim == 0 and value.dtype.kind in "fiu":
+            return real(name, value[()])
         raise TypeError(f"{name}: expected a number, got {type(value).__name__}")
     try:
         with np.errstate(all="ignore"):
@@ -194,13 +203,15 @@ def _indices(name: str, value: object, rows: str, columns: int) -> NDArray[np.ui
         return np.empty((0, columns), np.uint32)
     integers = _integers_of_any_size(value, array) if array.dtype.kind in "fO" else array
     if array.dtype.kind not in "iu" and integers is array:
-        remedy = f"; convert with {name}.astype(numpy.uint32)" if array.dtype.kind == "f" else ": indices of vertices"
+        remedy = _remedy_for_object(name, value, array, "faces") or "give indices of vertices"
+        if array.dtype.kind == "f":
+            remedy = f"convert with {name}.astype(numpy.uint32)"
         if array.dtype.kind == "f" and (array != np.round(array)).any():
             remedy = (
-                f"; these look like positions: {name} holds indices of vertices, and positions are given to detect() "
+                f"these look like positions: {name} holds indices of vertices, and positions are given to detect() "
                 "and the other queries"
             )
-        raise TypeError(f"{name}: expected integers, got {_kind(value, array)}{remedy}")
+        raise TypeError(f"{name}: expected integers, got {_kind(value, array)}; {remedy}")
     if array.ndim != 2 or array.shape[1] != columns:
         remedy = _remedy_for_indices(name, array, columns)
         raise ValueError(f"{name}: expected shape ({rows}, {columns}), got {array.shape}{remedy}")
@@ -291,8 +302,15 @@ def vertices(name: str, value: object, shape: tuple[int, ...], layout: MeshLayou
 
     A mapping holds the array of each mesh by its name.
     """
-    if type(value) is not np.ndarray and isinstance(value, Mapping):
+    if type(value) is np.ndarray:
+        array = _reals(name, value, value)
+    elif isinstance(value, Mapping):
         array = _of_meshes(name, value, shape, layout)
+    elif len(shape) == 2 and _is_list_of_meshes(value):
+        raise ValueError(
+            f"{name}: expected one array, got a list of {len(value)}; for several meshes give "
+            f"numpy.concatenate({name}), or a dict {{mesh: array}}"
+        )
     else:
         array = _reals(name, _array(name, value), value)
     if array.shape != shape:
@@ -302,6 +320,12 @@ def vertices(name: str, value: object, shape: tuple[int, ...], layout: MeshLayou
         )
     usable_in_place = array.flags.c_contiguous and array.flags.aligned
     return array if usable_in_place else np.require(array, None, ["C", "A"])
+
+
+def _is_list_of_meshes(value: object) -> TypeGuard[Sequence[object]]:
+    if not isinstance(value, (list, tuple)) or not value:
+        return False
+    return all(isinstance(mesh, np.ndarray) and mesh.ndim == 2 for mesh in value)
 
 
 def _of_meshes(name: str, value: Mapping[Any, Any], shape: tuple[int, ...], layout: MeshLayout) -> NDArray[Any]:
@@ -392,13 +416,23 @@ def _reals(name: str, array: NDArray[Any], value: object) -> NDArray[Any]:
         return array
     if array.dtype.newbyteorder("=") in REALS:
         return array.astype(array.dtype.newbyteorder("="))
-    remedy = "give an array of numbers"
+    remedy = _remedy_for_object(name, value, array, "vertices") or "give an array of numbers"
     if array.dtype.kind in "iuf" and array.ndim > 0:
         has_method = isinstance(value, np.ndarray)
         remedy = f"convert with {f'{name}.astype(numpy.float64)' if has_method else f'numpy.asarray({name}, float)'}"
     elif array.dtype.kind == "c":
         remedy = "coordinates are real numbers: give the array of their real parts, if that is what you mean"
     raise TypeError(f"{name}: expected float32 or float64, got {_kind(value, array)}; {remedy}")
+
+
+def _remedy_for_object(name: str, value: object, array: NDArray[Any], attribute: str) -> str:
+    """How to get an array from a mesh of trimesh, or from what only DLPack exports; empty for other objects."""
+    if array.dtype != object or array.ndim > 0:
+        return ""
+    if all(inspect.getattr_static(value, part, None) is not None for part in ("vertices", "faces")):
+        return f"give mesh.{attribute}"
+    exported = hasattr(type(value), "__dlpack__") and not isinstance(value, np.ndarray)
+    return f"give numpy.from_dlpack({name})" if exported else ""
 
 
 def _array(name: str, value: object) -> NDArray[Any]:

@@ -23,6 +23,7 @@ from .options import (
     ACCURACIES,
     BACKENDS,
     METHODS,
+    OUTPUTS,
     REPORTS,
     RESULTS,
     SIMD,
@@ -207,8 +208,10 @@ class Detector(
                 f"Detector: options are given by name, as in accuracy='exact'; got {len(unnamed)} without a name"
             )
         for name in unknown:
-            near = arguments.did_you_mean(name, _OPTIONS)
-            raise TypeError(f"Detector: there is no option {name!r}; help(hpccd_core.Detector) lists them{near}")
+            remedy = _OTHER_NAMES.get(name) or (
+                f"help(hpccd_core.Detector) lists them{arguments.did_you_mean(name, _OPTIONS)}"
+            )
+            raise TypeError(f"Detector: there is no option {name!r}; {remedy}")
         self.accuracy = arguments.choice("accuracy", accuracy, ACCURACIES)
         self.report = arguments.choice("report", report, REPORTS)
         arguments.choice("backend", backend, BACKENDS)
@@ -354,8 +357,9 @@ class Detector(
         Up to 256 meshes, separations are one table. Beyond that, memory and the cost of a change grow with the number
         of pairs that were set; on GPUs, if pairs differ, with the square of the number of meshes.
         """
+        distance = arguments.separation(separation)
         a, b = (arguments.mesh_number(n, m, self._mesh_numbers) for n, m in (("mesh_a", mesh_a), ("mesh_b", mesh_b)))
-        self._core.set_separation(a, b, arguments.length("separation", separation))
+        self._core.set_separation(a, b, distance)
 
     def set_separations(self, of_pairs: ArrayLike) -> None:
         """:meth:`set_separation` of all pairs at once.
@@ -422,3 +426,14 @@ class Detector(
 
 arguments.hide_unnamed(Detector.__init__)
 _OPTIONS = tuple(inspect.signature(Detector.__init__).parameters)[2:]
+# Options as papers and other libraries name them, and what to write here.
+_OTHER_NAMES = {
+    "tier": "write accuracy=",
+    "device": "write backend='cpu' or 'gpu'; results='device' leaves results on the GPU",
+    **{name: f"write outputs=({name!r},)" for name in OUTPUTS},
+    **dict.fromkeys(
+        ("d_hat", "dhat", "xi", "thickness", "margin", "min_distance"),
+        "write minimum_separation= for a thickness that no step violates, and call proximity(vertices, distance) for "
+        "the pairs within a distance such as d-hat",
+    ),
+}

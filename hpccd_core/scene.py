@@ -17,6 +17,8 @@ from .options import ACCURACIES, Accuracy, Feature
 # Most vertices or faces of a scene.
 _MOST = 2**32 - 2
 
+_NOT_GIVEN: ArrayLike = ()
+
 
 class Scene:
     """Meshes of triangles and of segments with fixed topology, and which pairs of them are tested.
@@ -46,9 +48,9 @@ class Scene:
     def add_mesh(
         self,
         name: str,
-        faces: ArrayLike = (),
+        faces: ArrayLike = _NOT_GIVEN,
         *unnamed: Any,
-        edges: ArrayLike = (),
+        edges: ArrayLike = _NOT_GIVEN,
         n_vertices: int | None = None,
         self_collision: bool = True,
         static: bool = False,
@@ -81,12 +83,16 @@ class Scene:
         TypeError, ValueError
             If an argument has the wrong type or shape, an index is out of range, or the name is taken.
         """
+        if unnamed and isinstance(unnamed[0], (bool, np.bool_, int)):
+            raise TypeError(f"add_mesh: options are given by name, as in static=True; got {unnamed[0]} without a name")
         if unnamed:
             raise TypeError(
                 "add_mesh: takes a name and faces; vertices are given to detect() and the other queries: write "
                 "add_mesh(name, faces, n_vertices=len(vertices))"
             )
         name = arguments.text("name", name)
+        if faces is edges is _NOT_GIVEN and n_vertices is None:
+            raise TypeError(f"add_mesh: mesh {name!r} has no vertices; give faces, edges or, for particles, n_vertices")
         self_collision, static = arguments.flag("self_collision", self_collision), arguments.flag("static", static)
         indices, segments = arguments.faces(faces), arguments.edges(edges)
         used = max(int(array.max()) + 1 if array.size else 0 for array in (indices, segments))
@@ -131,7 +137,7 @@ class Scene:
         -----
         A detector that was made before keeps its separations: use :meth:`Detector.set_separation`.
         """
-        self._call("set_separation", mesh_a, mesh_b, arguments.length("separation", separation))
+        self._call("set_separation", mesh_a, mesh_b, arguments.separation(separation))
 
     def set_features(self, mesh_a: MeshName, mesh_b: MeshName, features: Feature | Iterable[Feature]) -> None:
         """Test only some kinds of features between two meshes, instead of the detector's.

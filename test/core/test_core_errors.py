@@ -45,7 +45,7 @@ def changed(vertices, row, column, value):
         ([[0, 1, 2], [0, -1, 2]], ValueError, r"faces\[1, 1\] is -1"),
         ([[0, 1, 2**32 - 1]], ValueError, r"faces\[0, 2\] is 4294967295"),
         ([[0, 1, 2**40]], ValueError, r"faces\[0, 2\] is 1099511627776"),
-        ([[0, 1, 2j]], TypeError, r"faces.*integers.*complex128: indices"),
+        ([[0, 1, 2j]], TypeError, r"faces.*integers.*complex128; give indices"),
         (b"abc", TypeError, r"faces.*integers.*indices"),
     ],
 )

@@ -16,6 +16,22 @@ BOTH = np.concatenate([CLOTH, BALL])
 QUADS = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
 
 
+class Mesh:
+    """What trimesh has."""
+
+    vertices, faces = BALL, BALL_FACES
+
+
+class DlpackOnly:
+    """An array on the host that only DLPack exports."""
+
+    def __dlpack__(self, **_):
+        return BOTH.__dlpack__()
+
+    def __dlpack_device__(self):
+        return BOTH.__dlpack_device__()
+
+
 class Gradient:
     """What a PyTorch tensor that requires a gradient does."""
 
@@ -66,9 +82,24 @@ MISTAKES = {
     "vertices as faces": (add("ball", BALL), "faces: expected integers.*look like positions.*detect"),
     "faces as floats": (add("cloth", CLOTH_FACES.astype(float)), r"convert with faces\.astype\(numpy\.uint32\)"),
     "faces from 1": (add("cloth", CLOTH_FACES + 1, n_vertices=9), "is 9, but mesh 'cloth' has 9 vertices"),
+    "a mesh object as faces": (add("ball", Mesh()), "faces: expected integers, got Mesh; give mesh.faces$"),
+    "no faces": (add("ball", None), "faces: expected integers, got NoneType; give indices of vertices$"),
+    "an option without its name": (
+        add("ball", BALL_FACES, True),
+        "options are given by name, as in static=True; got True",
+    ),
+    "a name alone": (add("ball"), "mesh 'ball' has no vertices; give faces, edges or, for particles, n_vertices"),
     "number as name": (add(3, CLOTH_FACES), "name: expected a string, got int"),
     "unnamed option": (lambda: hc.Detector(scene(), "fast"), "options are given by name, as in accuracy='exact'"),
     "another option's name": (detector(min_separation=0.1), "no option 'min_separation'.*did you mean 'minimum_sep"),
+    "an output as option": (detector(normals=True), r"no option 'normals'; write outputs=\('normals',\)$"),
+    "d-hat as option": (
+        detector(d_hat=0.1),
+        r"no option 'd_hat'; .*minimum_separation= .*proximity\(vertices, distance\)",
+    ),
+    "thickness as option": (detector(thickness=0.1), "no option 'thickness'; write minimum_separation="),
+    "tier": (detector(tier="exact"), "no option 'tier'; write accuracy=$"),
+    "device": (detector(device="cuda"), "no option 'device'; write backend="),
     "unknown option": (detector(colour=1), r"no option 'colour'; help\(hpccd_core.Detector\) lists them$"),
     "misspelled choice": (detector(accuracy="Exakt"), "'Exakt' is not known.*did you mean 'exact'"),
     "output in singular": (detector(outputs="normal"), "outputs: 'normal' is not known.*did you mean 'normals'"),
@@ -92,6 +123,20 @@ MISTAKES = {
     ),
     "lists of integers": (detect([[0, 0, 0]] * 21, BOTH), r"convert with numpy\.asarray\(vertices_t0, float\)"),
     "a tensor with a gradient": (detect(Gradient(), BOTH), r"vertices_t0: .*tensor\.detach\(\)"),
+    "a mesh object": (detect(Mesh(), BOTH), "vertices_t0: expected float32 or float64, got Mesh; give mesh.vertices$"),
+    "a mesh object in a dict": (
+        detect({"cloth": CLOTH, "ball": Mesh()}, BOTH),
+        r"_t0\['ball'\]: .*; give mesh.vertices$",
+    ),
+    "a DLPack object": (
+        detect(BOTH, DlpackOnly()),
+        r"vertices_t1: .* DlpackOnly; give numpy\.from_dlpack\(vertices_t1\)$",
+    ),
+    "a list of meshes": (
+        detect([CLOTH, BALL], BOTH),
+        r"vertices_t0: .*list of 2; .*numpy\.concatenate\(vertices_t0\), or",
+    ),
+    "meshes of one size": (detect((BALL, BALL), BOTH), r"vertices_t0: .*list of 2; .*or a dict \{mesh: array\}"),
     "NaN": (detect(changed(2, np.nan), BOTH), r"vertices_t0\[2, 0\] is NaN"),
     "a static mesh that moves": (detect(BOTH, BOTH + 1), r"vertices_t1\[9\]: .*mesh 'ball'.*static"),
     "dict, misspelled mesh": (
@@ -102,6 +147,14 @@ MISTAKES = {
     "dict, swapped meshes": (
         detect({"cloth": BALL, "ball": CLOTH}, BOTH),
         r"vertices_t0\['cloth'\]: expected .*\(9, 3\)",
+    ),
+    "a separation in the middle": (
+        lambda: detector()().set_separation("cloth", 0.1, "ball"),
+        r"separation: .*got str; write set_separation\(mesh_a, mesh_b, separation\)",
+    ),
+    "a scene's separation in the middle": (
+        lambda: scene().set_separation("cloth", 0.1, "ball"),
+        r"separation: .*got str; write set_separation\(mesh_a, mesh_b, separation\)",
     ),
     "normals that were not asked for": (
         lambda: detect(BOTH, BOTH)().normals,
@@ -137,3 +190,14 @@ def test_the_error_names_the_remedy(mistake):
         with pytest.raises((TypeError, ValueError, AttributeError), match=words) as raised:
             call()
     assert len(str(raised.value)) < 300
+
+
+@pytest.mark.parametrize("kind", (np.int64, np.float32, np.float64, ">f8"))
+def test_arrays_without_dimensions_are_numbers(kind):
+    one = np.ones((), kind)
+    assert detector()().proximity(BOTH, one) == detector()().proximity(BOTH, 1.0)
+    assert detect(BOTH, BOTH, minimum_separation=one)() == detect(BOTH, BOTH, minimum_separation=1.0)()
+    with pytest.raises(TypeError, match="expected a number, got ndarray"):
+        detector(minimum_separation=one[None])()
+    with pytest.raises(TypeError, match="expected a number, got ndarray"):
+        detector(minimum_separation=np.True_[...])()
