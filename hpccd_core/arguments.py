@@ -10,7 +10,7 @@ import operator
 import struct
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain
-from typing import TYPE_CHECKING, Any, SupportsIndex, TypeGuard, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, SupportsIndex, TypeGuard, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ LARGEST_COORDINATE = 1e150  # largest_coordinate in src/bvh/coordinate_map.h
 DEEPEST = 8  # levels of nested lists: arguments have at most three dimensions, and a list may contain itself
 
 Word = TypeVar("Word", bound=str)
+Function = TypeVar("Function", bound=Callable[..., object])
 
 
 def flag(name: str, value: object) -> bool:
@@ -59,7 +60,7 @@ def choice(name: str, value: Word, choices: Iterable[str]) -> Word:
     return value
 
 
-def hide_unnamed(function: Callable[..., object]) -> None:
+def hide_unnamed(function: Function) -> Function:
     """Shorten the signature that help() shows: without annotations, as the docstring has the types, and without
     ``*unnamed`` and ``**unknown``, which are there for their errors.
     """
@@ -67,6 +68,12 @@ def hide_unnamed(function: Callable[..., object]) -> None:
     extra = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
     parameters = [p.replace(annotation=p.empty) for p in signature.parameters.values() if p.kind not in extra]
     function.__signature__ = signature.replace(parameters=parameters, return_annotation=signature.empty)  # type: ignore[attr-defined]
+    return function
+
+
+def reject_unnamed(query: str, remedy: str) -> NoReturn:
+    """Raise TypeError for an argument too many, among which `stream` once was."""
+    raise TypeError(f"{query}: takes {remedy}; a CUDA stream is given by name, as stream=")
 
 
 def did_you_mean(word: str, choices: Iterable[str]) -> str:

@@ -116,9 +116,9 @@ class Detector(
 
     Notes
     -----
-    All queries take their positions and `stream` as :meth:`detect` does, and raise the same errors.
-
-    One call at a time: calls from several Python threads wait for each other; only :meth:`cancel` does not. A child
+    Queries of a motion: :meth:`detect`, :meth:`step`, :meth:`collision_free_step`. Queries of one frame:
+    :meth:`proximity`, :meth:`intersections`, :meth:`distances`. All take positions and `stream` as :meth:`detect` does,
+    and raise the same errors. Calls from several threads wait for each other; only :meth:`cancel` does not. A child
     process made by os.fork() cannot use a detector with more than one thread. Detectors cannot be pickled.
 
     Examples
@@ -282,7 +282,8 @@ class Detector(
             "Detector from that where it is used"
         )
 
-    def step(self, vertices: Positions, stream: Stream = None) -> MotionResult:
+    @arguments.hide_unnamed
+    def step(self, vertices: Positions, *unnamed: NoReturn, stream: Stream = None) -> MotionResult:
         """Contacts of the motion from the positions of the last call to these.
 
         Parameters
@@ -297,6 +298,8 @@ class Detector(
         Contacts or DeviceContacts
             The first call, and the first after :meth:`reset`, returns no contacts.
         """
+        if unnamed:
+            arguments.reject_unnamed("step", "one array of positions; for two call detect(vertices_t0, vertices_t1)")
         made_on = device_arrays.stream_number(stream)
         with self._stepping:
             if device_arrays.is_on_device(vertices):
@@ -315,7 +318,7 @@ class Detector(
             contacts: Any = self._no_contacts()
         else:
             with _names_of_a_step():
-                contacts = self.detect(end if self._last is None else self._last, end, stream)
+                contacts = self.detect(end if self._last is None else self._last, end, stream=stream)
             if self._last is None:
                 contacts = contacts.without_rows()
         self._last = end
@@ -423,6 +426,11 @@ class Detector(
         """
         return self._core.stats()
 
+
+for _part in (MotionQueries, SnapshotQueries):  # Python's own errors name functions: by the class that users know
+    for _name, _function in vars(_part).items():
+        if inspect.isfunction(_function):
+            _function.__module__, _function.__qualname__ = __name__, f"Detector.{_name}"
 
 arguments.hide_unnamed(Detector.__init__)
 _OPTIONS = tuple(inspect.signature(Detector.__init__).parameters)[2:]

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Generic, cast
+from typing import Any, Generic, NoReturn, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ from .prepared import PreparedDetection
 from .result_types import MotionResult, StepResult
 from .results import result_of, with_outputs
 
+_TWO_ARRAYS = "two arrays of positions; a separation is an option of Detector"
+
 
 class MotionQueries(Generic[MotionResult, StepResult]):
     """Queries of the motion from one set of positions to the next."""
@@ -31,7 +33,10 @@ class MotionQueries(Generic[MotionResult, StepResult]):
     _layout: MeshLayout
     _outputs: tuple[str, ...]
 
-    def detect(self, vertices_t0: Positions, vertices_t1: Positions, stream: Stream = None) -> MotionResult:
+    @arguments.hide_unnamed
+    def detect(
+        self, vertices_t0: Positions, vertices_t1: Positions, *unnamed: NoReturn, stream: Stream = None
+    ) -> MotionResult:
         """Contacts of the straight-line motion from `vertices_t0` to `vertices_t1`.
 
         Parameters
@@ -59,10 +64,15 @@ class MotionQueries(Generic[MotionResult, StepResult]):
         Cancelled
             After :meth:`cancel`.
         """
+        if unnamed:
+            arguments.reject_unnamed("detect", _TWO_ARRAYS)
         found = self._of_motion("detect", vertices_t0, vertices_t1, stream)
         return cast(MotionResult, self._contacts(found))
 
-    def collision_free_step(self, vertices_t0: Positions, vertices_t1: Positions, stream: Stream = None) -> StepResult:
+    @arguments.hide_unnamed
+    def collision_free_step(
+        self, vertices_t0: Positions, vertices_t1: Positions, *unnamed: NoReturn, stream: Stream = None
+    ) -> StepResult:
         """The largest fraction of the motion that is certainly free of contacts.
 
         Parameters
@@ -82,11 +92,13 @@ class MotionQueries(Generic[MotionResult, StepResult]):
         Surfaces that intersect at the start without touching are no contact: query :meth:`intersections`. Trial steps
         from the same start are faster from the second call on, at "exact" and "conservative".
         """
+        if unnamed:
+            arguments.reject_unnamed("collision_free_step", _TWO_ARRAYS)
         times: NDArray[np.float64] = self._of_motion("collision_free_steps", vertices_t0, vertices_t1, stream)
         return cast(StepResult, float(times[0]) if self.worlds is None else times)
 
     def prepare(
-        self, vertices_t0: DeviceArrayLike, vertices_t1: DeviceArrayLike, room: float = 2.0, stream: Stream = None
+        self, vertices_t0: DeviceArrayLike, vertices_t1: DeviceArrayLike, room: float = 2.0, *, stream: Stream = None
     ) -> PreparedDetection:
         """A detection of these two device arrays that a CUDA graph can hold.
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Generic, cast
+from typing import Any, Generic, NoReturn, cast
 
 from . import _core, arguments, device_arrays, device_results
 from .array_types import Positions, Stream
@@ -12,6 +12,8 @@ from .options import Results
 from .proximity import Gap, Intersections, Proximity
 from .result_types import DistancesResult, IntersectionsResult, ProximityResult
 from .results import result_of, with_outputs
+
+_ONE_FRAME = "the positions of one frame; for a motion call detect(vertices_t0, vertices_t1)"
 
 
 class SnapshotQueries(Generic[ProximityResult, IntersectionsResult, DistancesResult]):
@@ -25,7 +27,10 @@ class SnapshotQueries(Generic[ProximityResult, IntersectionsResult, DistancesRes
     _layout: MeshLayout
     _outputs: tuple[str, ...]
 
-    def proximity(self, vertices: Positions, distance: float, stream: Stream = None) -> ProximityResult:
+    @arguments.hide_unnamed
+    def proximity(
+        self, vertices: Positions, distance: float, *unnamed: NoReturn, stream: Stream = None
+    ) -> ProximityResult:
         """All vertex-face and edge-edge pairs within a distance of each other.
 
         Parameters
@@ -42,6 +47,8 @@ class SnapshotQueries(Generic[ProximityResult, IntersectionsResult, DistancesRes
             "exact" and "conservative": exactly the pairs of rational arithmetic; distances within 1e-12 of the
             scene's size.
         """
+        if unnamed:
+            arguments.reject_unnamed("proximity", "the positions of one frame, and a distance")
         distance = arguments.length("distance", distance)
         found = self._ask("proximity", vertices, stream, distance)
         on_device = self.results == "device"
@@ -49,7 +56,8 @@ class SnapshotQueries(Generic[ProximityResult, IntersectionsResult, DistancesRes
             return cast(ProximityResult, device_results.proximity_of(found, self._outputs, self._layout))
         return cast(ProximityResult, result_of(Proximity, with_outputs(found, self._outputs), self._layout))
 
-    def intersections(self, vertices: Positions, stream: Stream = None) -> IntersectionsResult:
+    @arguments.hide_unnamed
+    def intersections(self, vertices: Positions, *unnamed: NoReturn, stream: Stream = None) -> IntersectionsResult:
         """All edges that intersect or touch a face with which they share no vertex, coplanar ones included.
 
         Parameters
@@ -62,13 +70,16 @@ class SnapshotQueries(Generic[ProximityResult, IntersectionsResult, DistancesRes
         Intersections or DeviceIntersections
             Decided as by rational arithmetic, at every accuracy.
         """
+        if unnamed:
+            arguments.reject_unnamed("intersections", _ONE_FRAME)
         found = self._ask("intersections", vertices, stream)
         on_device = self.results == "device"
         if on_device:
             return cast(IntersectionsResult, device_results.intersections_of(found, self._layout))
         return cast(IntersectionsResult, result_of(Intersections, found, self._layout))
 
-    def distances(self, vertices: Positions, stream: Stream = None) -> DistancesResult:
+    @arguments.hide_unnamed
+    def distances(self, vertices: Positions, *unnamed: NoReturn, stream: Stream = None) -> DistancesResult:
         """The smallest distance of each pair of meshes that the scene enables, within a mesh too.
 
         Parameters
@@ -87,6 +98,8 @@ class SnapshotQueries(Generic[ProximityResult, IntersectionsResult, DistancesRes
         of two pairs at the same exact distance is rounded to the smaller double is unspecified, but the same on every
         machine.
         """
+        if unnamed:
+            arguments.reject_unnamed("distances", _ONE_FRAME)
         names = self._layout.mesh_names
         gaps = [
             Gap(names[a], names[b], distance, kind, tuple(features), points)

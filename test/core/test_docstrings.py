@@ -63,6 +63,9 @@ def test_arguments_are_documented_one_by_one(name, function):
     assert doc, f"{name}: no docstring"
 
 
+QUERIES = ("detect", "step", "collision_free_step", "proximity", "intersections", "distances")
+
+
 def test_help_of_the_detector_is_short():
     summary = inspect.getdoc(hc.Detector)
     assert len(summary.splitlines()) <= 100 and max(map(len, summary.splitlines())) <= 120
@@ -70,7 +73,8 @@ def test_help_of_the_detector_is_short():
     assert "Union[" not in text and "_NestedSequence" not in text
     assert len(text.splitlines()) <= 325 and max(map(len, text.splitlines())) < 300
     assert "Detector(scene, *, accuracy='exact', backend='auto'" in text
-    assert "detect(self, vertices_t0: 'Positions', vertices_t1: 'Positions', stream: 'Stream' = None)" in text
+    assert "detect(self, vertices_t0, vertices_t1, *, stream=None)" in text
+    assert all(f":meth:`{query}`" in summary for query in QUERIES)
     options = list(inspect.signature(hc.Detector).parameters)
     listed = {word for line in re.findall(r"^(\w[\w, ]*) : ", summary, re.M) for word in line.split(", ")}
     assert listed == set(options)

@@ -109,6 +109,30 @@ MISTAKES = {
         lambda: hc.Detector(CLOTH_FACES),
         r"scene: expected hpccd_core.Scene.*Scene\(\) and",
     ),
+    "both ends to step": (lambda: detector()().step(BOTH, BOTH), "step: takes one array .*for two call detect"),
+    "a separation to detect": (
+        detect(BOTH, BOTH, 0.01),
+        "detect: takes two arrays of positions; a separation is an opt",
+    ),
+    "a stream by position": (detect(BOTH, BOTH, 0), "detect: takes two arrays .*by name, as stream=$"),
+    "both ends to intersections": (
+        lambda: detector()().intersections(BOTH, BOTH),
+        "intersections: takes the positions of one frame; for a motion call detect",
+    ),
+    "both ends to distances": (
+        lambda: detector()().distances(BOTH, BOTH),
+        "distances: takes the positions of one frame",
+    ),
+    "both ends to proximity": (
+        lambda: detector()().proximity(BOTH, BOTH, 0.1),
+        "proximity: takes the positions of one frame, and a distance",
+    ),
+    "two separations": (
+        lambda: detector()().collision_free_step(BOTH, BOTH, 0.1),
+        "collision_free_step: takes two arrays of positions",
+    ),
+    "one end": (detect(BOTH), r"^Detector\.detect\(\) missing 1 required positional argument: 'vertices_t1'$"),
+    "an option to a query": (lambda: detector()().proximity(BOTH, d=1), r"^Detector\.proximity\(\) "),
     "one mesh of two": (detect(CLOTH, CLOTH), r"vertices_t0: expected shape \(21, 3\).*may be of mesh 'cloth' alone"),
     "too many rows": (detect(BOTH, np.vstack([BOTH, CLOTH])), r"vertices_t1: .*got \(30, 3\); .*n_vertices="),
     "(3, V)": (detect(BOTH.T, BOTH.T), r"vertices_t0: .*got \(3, 21\); transpose it: vertices_t0\.T"),
