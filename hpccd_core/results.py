@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import functools
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
+
+import numpy as np
 
 from .mesh_layout import Indices, MeshLayout, Sides
 from .options import OUTPUTS
@@ -47,6 +49,11 @@ class WithSides:
     def _pairs(self) -> tuple[Indices, Indices, Indices]:
         """vf, ee and ef."""
         raise NotImplementedError
+
+    def __getitem__(self, row: NoReturn) -> NoReturn:
+        """Raise TypeError: rows are in the arrays."""
+        arrays = ", ".join(name for name, value in vars(self).items() if isinstance(value, np.ndarray))
+        raise TypeError(f"{type(self).__name__}: not a sequence; its rows are in the arrays {arrays}")
 
     @functools.cached_property
     def _sides(self) -> Sides:

@@ -223,7 +223,8 @@ class Scene:
         Parameters
         ----------
         vertex : int or ndarray of int, shape (N,) or (N, 4)
-            Scene-wide index of a vertex, as in ``contacts.vf[:, 0]`` and ``contacts.ee``.
+            Scene-wide index of a vertex, as in ``contacts.vf[:, 0]`` and ``contacts.ee``. A row of ``contacts.vf`` is a
+            vertex and a face: give each by itself.
         face : int or ndarray of int, shape (N,)
             Scene-wide index of a face, as in ``contacts.vf[:, 1]``. Give one of both.
 
@@ -265,7 +266,8 @@ class Scene:
             )
         if indices.size and not (0 <= indices.min() and indices.max() < total):
             least, greatest = (arguments.shown(int(end)) for end in (indices.min(), indices.max()))
-            raise ValueError(f"{name}: indices must lie in [0, {total - 1}], got {least} to {greatest}")
+            row = "; of a row of contacts.vf give vertex=row[0] or face=row[1]" if indices.shape == (2,) else ""
+            raise ValueError(f"{name}: indices must lie in [0, {total - 1}], got {least} to {greatest}{row}")
         meshes = mesh_of(indices, offsets)
         return meshes, indices.astype(np.intp) - offsets[meshes]
 

@@ -194,6 +194,17 @@ MISTAKES = {
         lambda: scene().locate([[0, 1], [2, 3]]),
         r"vertex: expected shape \(N,\).*got \(2, 2\).*face=contacts.vf\[:, 1\]",
     ),
+    "a row of contacts.vf": (
+        lambda: scene().locate(np.array([3, 27])),
+        r"vertex: .*got 3 to 27; of a row of contacts.vf give vertex=row\[0\] or face=row\[1\]",
+    ),
+    "contacts by number": (
+        lambda: detect(BOTH, BOTH)()[0],
+        "^Contacts: not a sequence; its rows are in the arrays vf, vf_toc, ee, ee_toc$",
+    ),
+    "a loop over contacts": (lambda: list(detect(BOTH, BOTH)()), "^Contacts: not a sequence"),
+    "proximity by number": (lambda: detector()().proximity(BOTH, 1)[0], "^Proximity: .*ee_distance$"),
+    "intersections by number": (lambda: detector()().intersections(BOTH)[0], "^Intersections: .*arrays ef$"),
     "positions of faces from 1": (
         lambda: hc.Detector(one_based()).detect(CLOTH, CLOTH),
         r"got \(9, 3\); one row is missing: from faces that count vertices from 1, subtract 1",
