@@ -41,6 +41,13 @@ def output(outputs: dict[str, Array], name: str) -> Array:
         raise OutputNotComputed(f"{name}: not computed; make the detector with outputs={asked!r}") from None
 
 
+class _NotASequence(TypeError, KeyError):
+    """A TypeError. numpy tries to read elements, and takes an object that raises KeyError for one element: so object
+    arrays can hold results."""
+
+    __str__ = Exception.__str__
+
+
 class WithSides:
     """A result whose rows are pairs of features, each side of which belongs to one mesh."""
 
@@ -53,7 +60,7 @@ class WithSides:
     def __getitem__(self, row: NoReturn) -> NoReturn:
         """Raise TypeError: rows are in the arrays."""
         arrays = ", ".join(name for name, value in vars(self).items() if isinstance(value, np.ndarray))
-        raise TypeError(f"{type(self).__name__}: not a sequence; its rows are in the arrays {arrays}")
+        raise _NotASequence(f"{type(self).__name__}: not a sequence; its rows are in the arrays {arrays}")
 
     @functools.cached_property
     def _sides(self) -> Sides:

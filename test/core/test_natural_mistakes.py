@@ -236,3 +236,9 @@ def test_arrays_without_dimensions_are_numbers(kind):
         detector(minimum_separation=one[None])()
     with pytest.raises(TypeError, match="expected a number, got ndarray"):
         detector(minimum_separation=np.True_[...])()
+
+
+def test_object_arrays_hold_results():
+    found = detect(BOTH, BOTH)()
+    held = np.array([found, found], object)
+    assert held.shape == (2,) and held[1] is found and np.asarray(found).shape == ()
