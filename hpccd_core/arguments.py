@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .mesh_layout import MeshLayout
 
 REALS = frozenset({np.dtype(np.float32), np.dtype(np.float64)})  # in this machine's byte order
-LARGEST_COORDINATE = 1e150  # largest_coordinate in src/bvh/coordinate_map.h
+LARGEST_COORDINATE = 1e150  # largest_coordinate in src/base/coordinate_limits.h
 DEEPEST = 8  # levels of nested lists: arguments have at most three dimensions, and a list may contain itself
 
 Word = TypeVar("Word", bound=str)

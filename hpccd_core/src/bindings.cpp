@@ -255,7 +255,7 @@ Examples
 >>> detector.detect([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0.0, 0, 1], [1, 0, 1], [0, 1, 1]])
 Traceback (most recent call last):
 ...
-hpccd_core._core.Cancelled: the detection was cancelled
+hpccd_core._core.Cancelled: the detector was cancelled; create another one
 )";
   py::enum_<Accuracy>(m, "Accuracy")
       .value("fast", Accuracy::fast)

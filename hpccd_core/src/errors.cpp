@@ -5,7 +5,7 @@ namespace hpccd {
 
 // Not inline, so that the library contains their type information once, for all users.
 InvalidArgument::~InvalidArgument() = default;
-Cancelled::Cancelled() : std::runtime_error("the detection was cancelled") {}
+Cancelled::Cancelled() : std::runtime_error("the detector was cancelled; create another one") {}
 Cancelled::~Cancelled() = default;
 
 }  // namespace hpccd

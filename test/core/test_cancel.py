@@ -155,5 +155,5 @@ def test_a_cancelled_detector_results_no_query():
         lambda: detector.intersections(points),
         lambda: detector.distances(points),
     ):
-        with pytest.raises(hc.Cancelled):
+        with pytest.raises(hc.Cancelled, match="^the detector was cancelled; create another one$"):
             ask()

@@ -162,6 +162,9 @@ MISTAKES = {
     ),
     "meshes of one size": (detect((BALL, BALL), BOTH), r"vertices_t0: .*list of 2; .*or a dict \{mesh: array\}"),
     "NaN": (detect(changed(2, np.nan), BOTH), r"vertices_t0\[2, 0\] is NaN"),
+    "infinity in a static mesh": (detect(BOTH, changed(9, np.inf)), r"vertices_t1\[9, 0\] is infinite"),
+    "far away in a static mesh": (detect(BOTH, changed(9, 1e200)), r"vertices_t1\[9, 0\] is 1e\+200, .*scale"),
+    "displacements": (detect(BOTH, BOTH * 0), r"vertices_t1\[9\]: moves, .*positions at the end, not displacements"),
     "a static mesh that moves": (detect(BOTH, BOTH + 1), r"vertices_t1\[9\]: .*mesh 'ball'.*static"),
     "dict, misspelled mesh": (
         detect({"Cloth": CLOTH, "ball": BALL}, BOTH),

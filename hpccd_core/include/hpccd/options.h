@@ -18,7 +18,7 @@ inline namespace v0_1 {
 enum class Backend : std::uint8_t { automatic, cpu, hybrid, gpu };
 
 /// Which contacts are reported. all: every contact. first: those at the earliest time of impact. any: at most one,
-/// the first one found.
+/// not necessarily the earliest.
 enum class Report : std::uint8_t { all, first, any };
 
 /// Broad phase on CPUs. standard: the default traversal. published: Kim et al. 2009. naive: their baseline,

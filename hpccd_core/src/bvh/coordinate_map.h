@@ -6,15 +6,11 @@
 
 #include <math.h>
 
+#include "base/coordinate_limits.h"
 #include "base/hd.h"
 #include "base/real.h"
 
 namespace hpccd {
-
-// Beyond this, differences and squares of coordinates could overflow in the error bounds.
-inline constexpr double largest_coordinate = 1e150;
-// For one snapshot only differences are computed before ranges are checked.
-inline constexpr double largest_in_snapshot = 1e300;
 
 struct CoordinateMap {
   double center[3] = {0, 0, 0};

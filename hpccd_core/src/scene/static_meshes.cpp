@@ -3,22 +3,27 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstring>
+
+#include "base/coordinate_limits.h"
 
 namespace hpccd {
 namespace {
+
+bool is_valid(double x) { return std::fabs(x) <= largest_coordinate; }
 
 template <class Real>
 void require_rest(const Scene::Mesh& mesh, const Real* t0, const Real* t1) {
   const std::size_t begin = 3 * std::size_t{mesh.first_vertex}, n = 3 * std::size_t{mesh.n_vertices};
   if (std::memcmp(t0 + begin, t1 + begin, n * sizeof(Real)) == 0) return;
   for (std::size_t i = begin; i < begin + n; ++i)
-    // 0 and -0 differ only in their bits; NaN is reported when all coordinates are checked.
-    if (t0[i] < t1[i] || t0[i] > t1[i])
+    // 0 and -0 differ only in their bits; invalid coordinates are reported when all are checked.
+    if ((t0[i] < t1[i] || t0[i] > t1[i]) && is_valid(t0[i]) && is_valid(t1[i]))
       throw InvalidArgument(
           "vertices_t1[" + std::to_string(i / 3) + "]: moves, but it belongs to mesh '" + mesh.name +
-          "', which was added as static; give its vertices unchanged (in both arrays the meshes in the order "
-          "added, and one dtype), or add it as one that moves");
+          "', which was added as static; give positions at the end, not displacements, with its vertices unchanged (in "
+          "both arrays the meshes in the order added, and one dtype), or add it as one that moves");
 }
 
 // Bytes of this number of vertices, in the precision of p.
