@@ -322,8 +322,8 @@ def vertices(name: str, value: object, shape: tuple[int, ...], layout: MeshLayou
         array = _reals(name, _array(name, value), value)
     if array.shape != shape:
         raise ValueError(
-            f"{name}: expected shape {shape}, {'for each world ' if len(shape) > 2 else ''}one row a vertex of the "
-            f"scene's meshes in the order added, got {array.shape}{_remedy_for_positions(name, array, shape, layout)}"
+            f"{name}: expected shape {shape}, {'for each world ' if len(shape) > 2 else ''}one row per "
+            f"vertex, meshes in the order added, got {array.shape}{_remedy_for_positions(name, array, shape, layout)}"
         )
     usable_in_place = array.flags.c_contiguous and array.flags.aligned
     return array if usable_in_place else np.require(array, None, ["C", "A"])
@@ -356,7 +356,7 @@ def _of_meshes(name: str, value: Mapping[Any, Any], shape: tuple[int, ...], layo
         expected = (*shape[:-2], n_vertices, 3)
         if array.shape != expected:
             remedy = _remedy_for_positions(of_mesh, array, expected, None)
-            raise ValueError(f"{of_mesh}: expected shape {expected}, one row a vertex, got {array.shape}{remedy}")
+            raise ValueError(f"{of_mesh}: expected shape {expected}, one row per vertex, got {array.shape}{remedy}")
         parts.append(array)
     if len({array.dtype for array in parts}) > 1:
         parts = [widened(array) for array in parts]

@@ -112,7 +112,7 @@ class Detector(
     TypeError, ValueError
         If an option is unknown, invalid, or not available here.
     RuntimeError
-        If the system starts fewer threads.
+        If the system cannot start that many threads.
 
     Notes
     -----
@@ -351,7 +351,7 @@ class Detector(
         Parameters
         ----------
         mesh_a, mesh_b : str or int
-            Names or numbers of the meshes; the same mesh twice: within it.
+            Names or numbers of the meshes; the same mesh twice means its self-contact.
         separation : float
             Euclidean distance in the unit of the coordinates; 0 reports only contact.
 

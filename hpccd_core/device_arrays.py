@@ -100,7 +100,7 @@ def positions(name: str, value: Any, expected: tuple[int, ...], stream: int | No
     if kind not in ("<f4", "<f8"):
         raise TypeError(f"{name}: expected float32 or float64 on the device, got type {kind}")
     if shape != expected:
-        rows = f"{'for each world ' if len(expected) > 2 else ''}one row a vertex of the scene"
+        rows = f"{'for each world ' if len(expected) > 2 else ''}one row per vertex of the scene"
         raise ValueError(f"{name}: expected shape {expected}, {rows}, got {shape}")
     size, some = int(kind[2]), math.prod(shape) > 0
     if strides is not None and some and not _in_order(shape, strides, size):

@@ -107,7 +107,7 @@ class Scene:
         Parameters
         ----------
         mesh_a, mesh_b : str or int
-            Names or numbers of the meshes; the same mesh twice: within it.
+            Names or numbers of the meshes; the same mesh twice means its self-contact.
         """
         self._call("ignore_pair", mesh_a, mesh_b)
 
@@ -117,7 +117,7 @@ class Scene:
         Parameters
         ----------
         mesh_a, mesh_b : str or int
-            Names or numbers of the meshes; the same mesh twice: within it.
+            Names or numbers of the meshes; the same mesh twice means its self-contact.
         accuracy : {"exact", "conservative", "balanced", "fast"}
         """
         arguments.choice("accuracy", accuracy, ACCURACIES)
@@ -129,7 +129,7 @@ class Scene:
         Parameters
         ----------
         mesh_a, mesh_b : str or int
-            Names or numbers of the meshes; the same mesh twice: within it.
+            Names or numbers of the meshes; the same mesh twice means its self-contact.
         separation : float
             Euclidean distance in the unit of the coordinates; 0 reports only contact.
 
@@ -145,7 +145,7 @@ class Scene:
         Parameters
         ----------
         mesh_a, mesh_b : str or int
-            Names or numbers of the meshes; the same mesh twice: within it.
+            Names or numbers of the meshes; the same mesh twice means its self-contact.
         features : {"vertex_face", "edge_edge"} or both
             Kinds that are left out cost nothing. Intersections and distances always consider whole surfaces.
         """

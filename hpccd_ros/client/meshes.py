@@ -117,7 +117,7 @@ def vertices_message(
         kind = f"dtype {vertices.dtype}" if isinstance(vertices, np.ndarray) else type(vertices).__name__
         raise TypeError(f"vertices: expected an array of float32 or float64, got {kind}; convert with numpy.asarray")
     if vertices.ndim != 2 or vertices.shape[1] != 3 or not len(vertices):
-        raise ValueError(f"vertices: expected shape (n, 3), one row a vertex and at least one, got {vertices.shape}")
+        raise ValueError(f"vertices: expected shape (n, 3), one row per vertex and at least one, got {vertices.shape}")
     if unusable := coordinates.unusable_coordinates(vertices):
         raise ValueError(f"vertices: {unusable[1]}")
     if not isinstance(frame_id, str):

@@ -160,7 +160,7 @@ def test_arrays_on_the_device(shape, strides):
 @pytest.mark.parametrize(
     ("array", "why"),
     [
-        (OnDevice((5, 3)), r"expected shape \(4, 5, 3\), for each world one row a vertex of the scene, got \(5, 3\)"),
+        (OnDevice((5, 3)), r"expected shape \(4, 5, 3\), for each world one row per vertex of the scene, got \(5, 3\)"),
         (OnDevice((3, 5, 3)), r"got \(3, 5, 3\)"),
         (OnDevice((4, 5, 3), (240, 24, 8)), "must be C-contiguous"),
     ],
