@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hpccd echo`: print the messages of a topic."""
 
+import contextlib
 import sys
 import time
 from collections.abc import Sequence
 from typing import Any
 
 import rclpy
+from rcl_interfaces.msg import ParameterType
+from rcl_interfaces.srv import GetParameters
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
@@ -15,8 +18,9 @@ from rclpy.subscription import Subscription
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import counted, listed, quoted, suggestion
 from hpccd_ros.introspection import message_text, peer
-from hpccd_ros.middleware import graph, qos
+from hpccd_ros.middleware import graph, qos, topic_names
 from hpccd_ros.middleware.message_types import message_class
+from hpccd_ros.params import node_parameters
 
 # Messages that may wait to be printed.
 _DEPTH = 100
@@ -27,6 +31,15 @@ _SETTLE = 1.0
 _OF_EVERY_NODE = ("/rosout", "/parameter_events")
 # s without a message, after which it is said that none has come.
 _QUIET = 3.0
+# s for the publisher's node to answer why.
+_PATIENCE = 1.0
+# Last part of a topic -> the parameter of the node that switches it on.
+_SWITCHES = {
+    topic_names.DISTANCES: "distances",
+    topic_names.PAIRS: "pair_summaries",
+    topic_names.MARKERS: "markers",
+    topic_names.SURFACE: "markers",
+}
 
 
 def main(args) -> int:
@@ -118,7 +131,23 @@ class _Printer:
             if not printed and time.monotonic() > quiet_at:
                 quiet_at = float("inf")
                 publishers = counted(self._node.count_publishers(self._topic), "publisher")
-                print(f"{self._topic}: no message yet; it has {publishers}; Ctrl-C ends", file=sys.stderr, flush=True)
+                text = f"{self._topic}: no message yet; it has {publishers}{self._switched_off()}; Ctrl-C ends"
+                print(text, file=sys.stderr, flush=True)
+
+    def _switched_off(self) -> str:
+        """The end of a message: the publisher's parameter that is false, with the remedy."""
+        switch = _SWITCHES.get(self._topic.rpartition("/")[2])
+        for publisher in self._node.get_publishers_info_by_topic(self._topic) if switch else ():
+            name = graph.full_name(publisher.node_name, publisher.node_namespace)
+            request = GetParameters.Request(names=[switch])
+            deadline = time.monotonic() + _PATIENCE
+            with contextlib.suppress(UserError):  # of another program
+                (response,) = node_parameters.call(
+                    self._node, GetParameters, f"{name}/get_parameters", [request], deadline=deadline, remote=name
+                )
+                if any(v.type == ParameterType.PARAMETER_BOOL and not v.bool_value for v in response.values):
+                    return f"; parameter {switch} is false: hpccd param set {switch} true --node {name}"
+        return ""
 
     def _subscribe(self) -> None:
         offers = [publisher.qos_profile for publisher in self._node.get_publishers_info_by_topic(self._topic)]

@@ -96,3 +96,22 @@ def test_topics_are_listed(start_node, hpccd):
     lines = [line.split() for line in done.stdout.splitlines()]
     assert done.returncode == 0 and [f"{node.namespace}/contacts", "hpccd/msg/ContactArray"] in lines
     assert [f"{node.namespace}/meshes/cloth/vertices", "hpccd/msg/MeshVertices"] in lines and lines == sorted(lines)
+
+
+def test_an_output_that_is_off_names_its_parameter(start_node, children, hpccd):
+    node = start_node({"meshes": ["cloth"]})
+    name = f"{node.namespace}/hpccd"
+    echo = children.start("echo", "hpccd_ros.cli", "echo", f"{node.namespace}/pairs", "--once")
+    remedy = f"hpccd param set pair_summaries true --node {name}"
+    text = f"{node.namespace}/pairs: no message yet; it has 1 publisher; parameter pair_summaries is false: {remedy}; "
+    children.wait(lambda: echo.has_printed(text), "echo did not name the parameter", 60)
+    done = hpccd(*remedy.split()[1:])
+    assert done.returncode == 0, done.stderr
+    node.peer.topology("cloth", sheet_faces(N), N * N)
+    for stamp in range(2):
+        node.peer.vertices("cloth", sheet_positions(N, stamp), stamp=stamp)
+        node.frames_status(processed=stamp + 1)
+    children.wait(lambda: not echo.running, "echo did not print the message", 60)
+    assert echo.process.returncode == 0 and echo.has_printed("\npairs:")
+    silent = children.start("silent", "hpccd_ros.cli", "echo", f"{node.namespace}/contacts")
+    children.wait(lambda: silent.has_printed("1 publisher; Ctrl-C ends"), "echo is not silent", 60)
