@@ -16,6 +16,12 @@ _SHOWN = 32
 FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 
 
+def no_folder(path: str | Path) -> str:
+    """That the folder of the file ``path`` does not exist, and the remedy; "": it does."""
+    folder = Path(path).parent
+    return "" if folder.is_dir() else f"there is no folder {folder}; create it"
+
+
 @contextlib.contextmanager
 def whole_file(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
     """The place to write to. Its content becomes the file `path` when the block ends without an exception.
@@ -24,7 +30,8 @@ def whole_file(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
     the name of `path`, in a hidden folder beside it, so writers that read the format from the name find it; a killed
     process leaves that folder. A device or a pipe is written to directly.
 
-    Raises FileExistsError if `path` exists and may not be overwritten. An OSError about the place or a full disk names
+    Raises FileExistsError if `path` exists and may not be overwritten, FileNotFoundError if its folder does not exist.
+    An OSError about the place or a full disk names
     `path`.
     """
     shown = str(path)
@@ -42,6 +49,8 @@ def whole_file(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
             if not os.access(target, os.W_OK):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        if why := no_folder(path) or no_folder(target):
+            raise FileNotFoundError(errno.ENOENT, why)
         folder = Path(tempfile.mkdtemp(prefix=f".{target.name[:_SHOWN]}.", suffix=".part", dir=target.parent))
         own = str(folder)
         draft = folder / target.name

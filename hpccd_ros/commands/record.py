@@ -22,7 +22,12 @@ from hpccd_ros.params.table import LEAST_SPLIT_SIZE, LEAST_SPLIT_TIME, MOST_SPLI
 
 
 def configure(parser):
-    parser.add_argument("-o", "--output", metavar="PATH", help="file NAME.mcap, or folder for a split recording")
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="PATH",
+        help="new file NAME.mcap, or new folder for a split recording, in an existing folder",
+    )
     parser.add_argument("--node", default="/hpccd", help="full name of the node to record (default: %(default)s)")
     parser.add_argument(
         "--topic",

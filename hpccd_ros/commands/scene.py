@@ -60,7 +60,9 @@ def configure(parser):
         help="number to wait for; 2 for a node and a recorder (default: %(default)s)",
     )
     play.add_argument("--ros-args", nargs="...", default=[], help="ROS arguments, such as remappings")
-    files = parser.add_argument_group("write a file (existing files are not overwritten, but for pictures)")
+    files = parser.add_argument_group(
+        "write a file, into an existing folder (existing files are not overwritten, but for pictures)"
+    )
     files.add_argument("--mcap", metavar="FILE", help="recording of all frames")
     files.add_argument(
         "--compression",

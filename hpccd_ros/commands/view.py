@@ -23,7 +23,8 @@ def configure(parser):
         "-o",
         "--output",
         metavar="PATH",
-        help="picture (.png, .jpg, .pdf), page (.html), Rerun recording (.rrd), or folder with --every",
+        help="picture (.png, .jpg, .pdf), page (.html), Rerun recording (.rrd), in an existing folder; with --every, a "
+        "folder",
     )
     parser.add_argument("--html", metavar="PATH", help="write an interactive HTML page that needs no network")
     parser.add_argument(

@@ -12,8 +12,9 @@ from rclpy.executors import SingleThreadedExecutor
 
 from hpccd_ros.bag.writer import BagWriter
 from hpccd_ros.base.errors import UserError, require_utf8
-from hpccd_ros.base.quoting import counted
-from hpccd_ros.middleware import environment, ros_start, stop_signals, topic_names
+from hpccd_ros.base.quoting import counted, listed
+from hpccd_ros.base.whole_file import no_folder
+from hpccd_ros.middleware import environment, graph, ros_start, stop_signals, topic_names
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.params import node_parameters
 from hpccd_ros.record import attachments, recorded_topics
@@ -22,11 +23,15 @@ from hpccd_ros.record.topic_recorder import DescribedRobots, Recorder
 
 # Seconds: long enough for a shape that is sent with the first pose, and early enough to start again.
 LOOK_EVERY = 5.0
+# Seconds without the node, or its results, until the recorder says that it waits.
+NOTICE = 2.0
 
 
 def main(args) -> int:
     """Record as the options of `hpccd record` say; returns the exit status."""
     target = Path(args.output or datetime.now().strftime("hpccd-%Y%m%d-%H%M%S.mcap"))
+    if why := no_folder(target):
+        raise UserError(f"-o {target}: {why}")
     with stop_signals.collected() as stop:
         return _record_until(stop, target, args)
 
@@ -51,6 +56,7 @@ def _record_until(stop, target, args) -> int:
 
 
 def _record(node, target, args, stop) -> int:
+    _await(node, args, stop)
     parameters = node_parameters.fetch(node, args.node, args.wait, stop)
     if not parameters.get("meshes") and not parameters.get("robots"):
         raise UserError(f"--node {args.node}: it has neither meshes nor robots; name an hpccd node that has some")
@@ -85,6 +91,16 @@ def _record(node, target, args, stop) -> int:
     return 1 if bag.write_errors else 0
 
 
+def _await(node, args, stop) -> None:
+    """Say that the node is not there, unless it appears at once."""
+    deadline = time.monotonic() + NOTICE
+    while args.wait > NOTICE and args.node not in graph.other_nodes(node) and not stop:
+        if time.monotonic() > deadline:
+            _warn(f"waiting for node {args.node} on {graph.domain()}, {args.wait:g} s at most (--wait); Ctrl-C ends")
+            return
+        rclpy.spin_once(node, timeout_sec=0.05)
+
+
 def _warn(text) -> None:
     print(text, file=sys.stderr, flush=True)
 
@@ -94,7 +110,7 @@ def _spin(node, recorder, bag, contacts, args, stop, missing):
     executor.add_node(node)
     status = Status(bag, recorder, contacts)
     started = look = time.monotonic()
-    ready = warned = False
+    ready = warned = waits = False
     while not stop:
         executor.spin_once(timeout_sec=0.1)
         bag.poll()
@@ -104,6 +120,12 @@ def _spin(node, recorder, bag, contacts, args, stop, missing):
             print(
                 f"recording {args.node} into {bag.path}: {counted(len(recorder.topics), 'topic')}, Ctrl-C ends",
                 flush=True,
+            )
+        if not (ready or waits) and time.monotonic() >= started + NOTICE:
+            waits = True
+            _warn(
+                f"{contacts}: no publisher yet; configure {args.node} (hpccd lifecycle), or give its remappings here, "
+                "after --ros-args"
             )
         status.update()
         if not warned and time.monotonic() >= look + LOOK_EVERY:
@@ -160,6 +182,8 @@ def _report(bag, recorder, missing):
             print(
                 f"  {name}: {counted(count, 'message')}" + (f", {lost} LOST on the way to the recorder" if lost else "")
             )
+    if silent := [name for name, count in recorder.received.items() if not count]:
+        print(f"  no message: {listed(silent)}")
     for text in missing:
         print(f"  {text}")
     files = bag.file_paths

@@ -39,7 +39,6 @@ def write_mcap(scene: Scene, path: str | Path, rate: float, compression: str = "
     for topic in messages.topics(scene):
         topics.append(Topic("/" + topic.name, topic.type_name, [_offered(topic.latched)], topic.latched))
         info["topics"]["/" + topic.name] = topic.name
-    Path(path).parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as draft:
         bag = BagWriter(draft, info=info, compression=compression)
         try:

@@ -96,6 +96,11 @@ def test_errors_name_the_file_and_not_the_draft(tmp_path):
     with pytest.raises(FileNotFoundError) as missing, whole_file(tmp_path / "no" / "run.png"):
         pytest.fail("there is no such folder")
     assert missing.value.filename == str(tmp_path / "no" / "run.png")
+    assert missing.value.strerror == f"there is no folder {tmp_path / 'no'}; create it"
+    (tmp_path / "link").symlink_to(tmp_path / "no" / "run.png")
+    with pytest.raises(FileNotFoundError, match="there is no folder .*/no; create"), whole_file(tmp_path / "link"):
+        pytest.fail("the link leads into no folder")
+    (tmp_path / "link").unlink()
     with pytest.raises(OSError) as other, whole_file(path):
         open(tmp_path / "another file")
     assert other.value.filename == str(tmp_path / "another file")

@@ -214,7 +214,7 @@ def test_a_page_that_no_browser_would_hold(small_bag, tmp_path, monkeypatch):
 def test_steps_and_places_that_are_not_there(hpccd, small_bag, tmp_path):
     for options, says in (
         (("--html", "x.html", "--step", 900), "no step 900"),
-        (("--html", "no/folder/x.html"), "--html no/folder/x.html: there is no folder no/folder"),
+        (("--html", "no/folder/x.html"), "--html no/folder/x.html: there is no folder no/folder; create it\n"),
         (("--html", "x.html", "-o", "y.png"), "--html x.html: takes neither --rerun nor --output"),
         (("--html", "."), "Is a directory"),
     ):

@@ -71,4 +71,4 @@ def test_steps_that_are_not_there(hpccd, small_bag):
     done = hpccd("view", small_bag, "--rerun", "--step", "900", "-o", "x.rrd")
     assert done.returncode == 2 and "no step 900" in done.stderr
     done = hpccd("view", small_bag, "-o", "no/folder/x.rrd")
-    assert done.returncode == 2 and "--output no/folder/x.rrd: No such file" in done.stderr
+    assert done.returncode == 2 and "--output no/folder/x.rrd: there is no folder no/folder" in done.stderr

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A recording that began after a shape was sent says so, with the remedy."""
+"""A recorder says what it waits for, and that its recording began after a shape was sent, with the remedy."""
 
+import os
 import signal
 
 import numpy as np
@@ -76,3 +77,18 @@ def test_a_recorder_that_came_late_says_it_at_once_and_at_the_end(start_node, ch
     recorder.process.send_signal(signal.SIGINT)
     children.wait(lambda: not recorder.running, "the recorder did not end", PATIENCE)
     assert recorder.has_printed(f"  {text}") and recorder.process.returncode == 0
+
+
+def test_a_recorder_says_what_it_waits_for(start_node, children, hpccd, tmp_path):
+    node = start_node({"meshes": ["box"], "autostart": False}, wait=False)
+    name = f"{node.namespace}/hpccd"
+    words = ("hpccd_ros.cli", "record", "--wait", WAIT, "-o")
+    early = children.start("early", *words, str(tmp_path / "early.mcap"), "--node", "/nobody/hpccd")
+    text = f"waiting for node /nobody/hpccd on ROS_DOMAIN_ID {os.environ['ROS_DOMAIN_ID']}, 240 s at most (--wait); "
+    children.wait(lambda: early.has_printed(text), "the recorder did not say that it waits", PATIENCE)
+    recorder = children.start("recorder", *words, str(tmp_path / "run.mcap"), "--node", name)
+    text = f"{node.namespace}/contacts: no publisher yet; configure {name} (hpccd lifecycle), or "
+    children.wait(lambda: recorder.has_printed(text), "the recorder did not say that it waits", PATIENCE)
+    assert not recorder.has_printed("recording ")
+    assert hpccd("lifecycle", "configure", "--node", name).returncode == 0
+    children.wait(lambda: recorder.has_printed(f"recording {name} into "), "the recorder did not begin", PATIENCE)

@@ -49,6 +49,8 @@ def test_recorded_live_read_by_others_and_verified(live, namespace, tmp_path, st
     known = f"{namespace}/contacts=hpccd/msg/ContactArray"
     recorder = _record(live, path, "--topic", known, stop=stop, node_options=(OUTPUTS,))
     assert "LOST" not in recorder.last_words() and recorder.has_printed("recorded ")
+    assert recorder.has_printed(": 7 topics, ")
+    assert recorder.has_printed(f"  no message: {namespace}/distances, {namespace}/pairs\n")
 
     steps = _verified(path)
     assert [step.step for step in steps] == list(range(1, FRAMES)), "every step is recorded and verified"

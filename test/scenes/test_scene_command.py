@@ -77,7 +77,11 @@ def test_step_is_what_the_detector_takes(capsys, tmp_path):
         (["two-triangles", "--png", "x.png", "--at", "11"], "--at 11: the scene has frames 0 to 10"),
         (["two-triangles", "--png", "x.xyz", "--at", "1"], "--png x.xyz: Format 'xyz' is not supported"),
         (["two-triangles", "--mcap", "x.bag"], "name a file that ends in .mcap"),
-        (["two-triangles", "--npz", os.path.join("no", "such", "folder", "x.npz")], "No such file or directory"),
+        (
+            ["two-triangles", "--npz", os.path.join("no", "such", "folder", "x.npz")],
+            "x.npz: there is no folder no/such/folder; create it\n",
+        ),
+        (["two-triangles", "--mcap", "no/x.mcap"], "no/x.mcap: there is no folder no; create it\n"),
     ],
 )
 def test_wrong_use_is_explained(capsys, tmp_path, monkeypatch, words, message):

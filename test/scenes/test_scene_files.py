@@ -101,6 +101,7 @@ def test_mcap_is_the_same_file_each_time_and_names_its_scene(tmp_path):
     # The bag's metadata hold one name.
     first, second = (tmp_path / folder / "scene.mcap" for folder in "ab")
     for path in (first, second):
+        path.parent.mkdir()
         files.write_mcap(scene, path, rate=30.0)
     assert first.read_bytes() == second.read_bytes()
     with Recording(first) as recording:

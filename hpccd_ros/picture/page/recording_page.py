@@ -227,9 +227,7 @@ LARGE = 50_000_000
 
 def write_page(args, source: Path, target: Path, title: str, view: dict) -> int:
     """As the options of `hpccd view` say. view: azimuth, elevation."""
-    library = three()  # before anything is computed, as the folder
-    if not target.parent.is_dir():
-        raise UserError(f"--html {target}: there is no folder {target.parent}")
+    library = three()  # before anything is computed
     every = args.every or 1
     try:
         with whole_file(target, overwrite=True) as draft:
