@@ -80,7 +80,7 @@ def did_you_mean(word: str, choices: Iterable[str]) -> str:
     """The end of an error message: the choice that is spelled most like the word, if one is."""
     by_lower = {choice.lower(): choice for choice in choices}
     near = difflib.get_close_matches(word.lower().replace("-", "_"), by_lower, n=1)
-    return f"; did you mean {by_lower[near[0]]!r}?" if near else ""
+    return f"; did you mean {by_lower[near[0]]}?" if near else ""
 
 
 def whole_number(name: str, value: SupportsIndex, low: int, high: int) -> int:

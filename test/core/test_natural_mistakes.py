@@ -91,7 +91,7 @@ MISTAKES = {
     "a name alone": (add("ball"), "mesh 'ball' has no vertices; give faces, edges or, for particles, n_vertices"),
     "number as name": (add(3, CLOTH_FACES), "name: expected a string, got int"),
     "unnamed option": (lambda: hc.Detector(scene(), "fast"), "options are given by name, as in accuracy='exact'"),
-    "another option's name": (detector(min_separation=0.1), "no option 'min_separation'.*did you mean 'minimum_sep"),
+    "another option's name": (detector(min_separation=0.1), "no option 'min_separation'.*did you mean minimum_sep"),
     "an output as option": (detector(normals=True), r"no option 'normals'; write outputs=\('normals',\)$"),
     "d-hat as option": (
         detector(d_hat=0.1),
@@ -101,10 +101,10 @@ MISTAKES = {
     "tier": (detector(tier="exact"), "no option 'tier'; write accuracy=$"),
     "device": (detector(device="cuda"), "no option 'device'; write backend="),
     "unknown option": (detector(colour=1), r"no option 'colour'; help\(hpccd_core.Detector\) lists them$"),
-    "misspelled choice": (detector(accuracy="Exakt"), "'Exakt' is not known.*did you mean 'exact'"),
-    "output in singular": (detector(outputs="normal"), "outputs: 'normal' is not known.*did you mean 'normals'"),
-    "hyphen for underscore": (detector(features="vertex-face"), "did you mean 'vertex_face'"),
-    "misspelled mesh": (lambda: scene().ignore_pair("cloth", "Ball"), "no mesh is named 'Ball'.*did you mean 'ball'"),
+    "misspelled choice": (detector(accuracy="Exakt"), "'Exakt' is not known.*did you mean exact[?]"),
+    "output in singular": (detector(outputs="normal"), "outputs: 'normal' is not known.*did you mean normals[?]"),
+    "hyphen for underscore": (detector(features="vertex-face"), "did you mean vertex_face[?]"),
+    "misspelled mesh": (lambda: scene().ignore_pair("cloth", "Ball"), "no mesh is named 'Ball'.*did you mean ball[?]"),
     "faces for a scene": (
         lambda: hc.Detector(CLOTH_FACES),
         r"scene: expected hpccd_core.Scene.*Scene\(\) and",
@@ -168,7 +168,7 @@ MISTAKES = {
     "a static mesh that moves": (detect(BOTH, BOTH + 1), r"vertices_t1\[9\]: .*mesh 'ball'.*static"),
     "dict, misspelled mesh": (
         detect({"Cloth": CLOTH, "ball": BALL}, BOTH),
-        "no mesh is named 'Cloth'.*you mean 'cloth'",
+        "no mesh is named 'Cloth'.*you mean cloth[?]",
     ),
     "dict, missing mesh": (detect(BOTH, {"cloth": CLOTH}), "vertices_t1: has no positions of mesh 'ball'; give"),
     "dict, swapped meshes": (
