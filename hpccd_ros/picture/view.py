@@ -73,7 +73,8 @@ def _show_in_rerun(args, steps, source, title, view):
     except OSError as error:
         raise UserError(f"--output {target}: {error.strerror}") from error
     if target is not None:
-        print(f"{target}: {count} steps, {Path(target).stat().st_size / 1e6:.1f} MB; open it with: rerun {target}")
+        size = f"{Path(target).stat().st_size / 1e6:.1f} MB"
+        print(f"{target}: {counted(count, 'step')}, {size}; open it with: rerun {target}")
 
 
 HINT = "; `hpccd replay` says why"
@@ -125,4 +126,4 @@ def _draw_many(args, steps, folder, title, view):
             count += 1
             if sys.stderr.isatty():
                 print(f"\r{count} drawn ", end="", file=sys.stderr, flush=True)
-    print(f"{folder}: {count} {'picture' if count == 1 else 'pictures'}")
+    print(f"{folder}: {counted(count, 'picture')}")

@@ -40,7 +40,7 @@ def _recover(source, args) -> int:
     except OSError as error:
         raise UserError(f"--recover {args.recover}: {error.strerror}") from error
     _print_examination(found)
-    print(f"saved {found.message_count} messages, {_seconds(found):.3f} s: {args.recover}")
+    print(f"saved {counted(found.message_count, 'message')}, {_seconds(found):.3f} s: {args.recover}")
     return 0
 
 
@@ -61,7 +61,7 @@ def _print_examination(found: Examination) -> None:
     )
     if found.message_count:
         begin = datetime.fromtimestamp(found.start * 1e-9, UTC).strftime("%Y-%m-%d %H:%M:%S")
-        print(f"  {found.message_count} messages in {_seconds(found):.3f} s from {begin} UTC")
+        print(f"  {counted(found.message_count, 'message')} in {_seconds(found):.3f} s from {begin} UTC")
     for topic, count in found.counts.items():
         print(f"    {count:7} {printable(topic)}  {printable(found.types.get(topic, '(type unknown)'))}")
     if found.problem:
@@ -69,7 +69,7 @@ def _print_examination(found: Examination) -> None:
     if found.damaged_chunks:
         print(
             f"  {counted(found.damaged_chunks, 'damaged chunk')} skipped"
-            + (f", and {found.orphans} messages that only they described" if found.orphans else "")
+            + (f", and {counted(found.orphans, 'message')} that only they described" if found.orphans else "")
         )
     if not found.sound and found.message_count:
         print(f"  `hpccd doctor {found.path} --recover OUT.mcap` saves the messages above")

@@ -18,7 +18,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from hpccd_ros.bag.decode import checked_type
 from hpccd_ros.bag.reader import RecordedTopic, Recording, RecordingError
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.base.quoting import listed
+from hpccd_ros.base.quoting import counted, listed
 from hpccd_ros.middleware import environment, message_types, qos, ros_start, stop_signals, topic_names, transform_topics
 from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
 from hpccd_ros.replay import recorded_setup
@@ -54,7 +54,8 @@ def main(args) -> int:
         finally:
             node.destroy_node()
             rclpy.try_shutdown()
-        print(f"published {count} messages on {len(topics)} topics{' until told to stop' if stop else ''}", flush=True)
+        what = f"{counted(count, 'message')} on {counted(len(topics), 'topic')}"
+        print(f"published {what}{' until told to stop' if stop else ''}", flush=True)
     return 0
 
 

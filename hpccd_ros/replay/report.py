@@ -243,17 +243,17 @@ class Summary:
         if self.computed:
             print(
                 f"  {wall:.2f} s ({self.milliseconds / self.computed:.2f} ms a step in the core) for "
-                f"{self.seconds_recorded:.2f} s of motion; {args.threads or os.cpu_count()} threads"
+                f"{self.seconds_recorded:.2f} s of motion; {counted(args.threads or os.cpu_count(), 'thread')}"
             )
         _print_losses(replay)
         if self.before:
             print(
-                f"  {self.before} results not verified: their step began before the recording, or depends on earlier "
-                "messages"
+                f"  {counted(self.before, 'result')} not verified: the step began before the recording, or depends on "
+                "earlier messages"
             )
         if self.missing:
             print(
-                f"  {replay.unverified} results NOT VERIFIED, first step {self.missing.step} "
+                f"  {counted(replay.unverified, 'result')} NOT VERIFIED, first step {self.missing.step} "
                 f"(ends at {self.missing.end} ns): {self.missing.missing}"
             )
         _print_distances(replay.distances)
@@ -265,14 +265,15 @@ class Summary:
                 f"  {first.difference}"
             )
         elif replay.verified:
+            hold, are = ("holds", "is") if replay.verified == 1 else ("hold", "are")
             what = (
-                "hold a contact where there is one, and one that there is"
+                f"{hold} a contact where there is one, and one that there is"
                 if replay.any_one
-                else ("are equal in every contact, time and hash")
+                else f"{are} equal in every contact, time and hash"
             )
             # The word stands for all of the recording.
             verdict = " " if replay.distances.diverged else "VERIFIED:"
-            print(f"{verdict} {replay.verified} results {what} ({self._tiers()})")
+            print(f"{verdict} {counted(replay.verified, 'result')} {what} ({self._tiers()})")
         elif replay.recorded_results and not replay.unverified and (args.begin > 0 or args.end < float("inf")):
             print("NOTHING VERIFIED: no step of the recording ends between --from and --to (seconds of it)")
         elif replay.recorded_results:
@@ -296,9 +297,10 @@ def _print_distances(distances) -> None:
             f"differ, the first:\n  {distances.first}"
         )
     elif distances.unverified:
-        print(f"  {distances.unverified} results about distances NOT VERIFIED, the first: {distances.first}")
+        print(f"  {counted(distances.unverified, 'result')} about distances NOT VERIFIED, the first: {distances.first}")
     elif distances.verified:
-        print(f"  {distances.verified} results about distances are equal, points included")
+        are = "is" if distances.verified == 1 else "are"
+        print(f"  {counted(distances.verified, 'result')} about distances {are} equal, points included")
 
 
 def _print_losses(replay) -> None:
@@ -307,7 +309,7 @@ def _print_losses(replay) -> None:
             print(f"  {count} {what} of {mesh} not used: {reason}{_HINTS.get(reason, '').format(mesh=mesh)}")
     for topic, count in sorted(replay.not_taken.items()):
         if count:
-            print(f"  {count} messages of {topic} not taken by the node: lost on the way to it, or rejected")
+            print(f"  {counted(count, 'message')} of {topic} not taken by the node: lost on the way to it, or rejected")
 
 
 def _progress_bar() -> Progress:

@@ -301,6 +301,8 @@ def test_one_step_at_each_enter(hpccd, small_bag):
     lines = [line for line in done.stdout.splitlines() if "contacts, hash 0x" in line]
     assert len(lines) == 3 and all(line.endswith(", equal") for line in lines)
     assert "VERIFIED: 3 results" in done.stdout
+    done = hpccd("replay", small_bag, "--from", "1", "--step", "--threads", "1", input="")
+    assert "; 1 thread\n" in done.stdout and "VERIFIED: 1 result is equal in every contact" in done.stdout
 
 
 def test_replay_of_unusable_files(hpccd, small_bag, tmp_path):

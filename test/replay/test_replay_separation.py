@@ -219,7 +219,7 @@ def test_distances_without_their_frame_are_not_called_verified(changed, near_bag
     path = changed(1, header=header)
     assert _counts(_replay(path)[0].distances) == (6, 0, 1)
     done = hpccd("replay", path)
-    assert done.returncode == 1 and "1 results about distances NOT VERIFIED, the first: distances at" in done.stdout
+    assert done.returncode == 1 and "  1 result about distances NOT VERIFIED, the first: distances at" in done.stdout
     before = _copy(header, stamp=Time(sec=1))
     assert _counts(_replay(changed(1, header=before))[0].distances) == (6, 0, 0), "it began before the recording did"
     negative = _copy(header, stamp=Time(sec=-1))

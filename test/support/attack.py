@@ -167,8 +167,8 @@ def _lies(path, row, steps, told) -> list[str]:
     true = collections.Counter(step for step, why in zip(reader.steps(), whys, strict=True) if why is None)
     if wrong := verified - true:
         return [f"replay: WRONG VERIFIED: {list(wrong)}; untrue are {list(zip(reader.steps(), whys, strict=True))}"]
-    said = re.search(r"(\d+) results not verified: their step began", told)
-    untold = row["unverified"] + (int(said[1]) if said else 0)
+    said = re.search(r"([\d,]+) results? not verified: the step began", told)
+    untold = row["unverified"] + (int(said[1].replace(",", "")) if said else 0)
     if row["verified"] + untold != len(reader.results):
         return [f"replay: {row['verified']} results verified, the file has {len(reader.results)}"]
     return []
