@@ -23,11 +23,13 @@ NOT_CONFIGURED, WRONG_PARAMETERS, NO_SECURITY = 1, 2, 3
 _NO_LOG_FILE = "--disable-external-lib-logs"
 # Errors of rclpy's C++ part, whose classes are not in its public interface.
 _OF_RCL = ("RCLError", "NodeError", "UnknownROSArgsError")
+_FILE = "a parameter file is YAML as config/hpccd.yaml: node name or /**, ros__parameters, names and values"
 _REMEDIES = {
     "Sequence should be of same type": "the entries of a list need one type: write 0.0, not 0, beside 0.5",
-    "params file": "a parameter file is YAML as config/hpccd.yaml: node name or /**, ros__parameters, names and values",
     "remap rule": "write -r FROM:=TO",
     "parameter override rule": "write -p NAME:=VALUE, and texts with a colon in quotes: -p NAME:=\"['a:b']\"",
+    "Error parsing": f"{_FILE}; quote values that contain ://",  # libyaml rejects them within braces
+    "params file": _FILE,
     "--params-file flag": "write --params-file FILE",
     "ROS_DOMAIN_ID": "set it to 0 .. 232, or unset it",
     "resolve peer": "set ROS_STATIC_PEERS to names or addresses with ; between them, or unset it",

@@ -86,6 +86,11 @@ FILES = {
     "control-character": (HEAD + "    accuracy: a\x01b\n", 2, "Error parsing"),
     "latin-1": ((HEAD + "    accuracy: \xe9\n").encode("latin-1"), 2, "Error parsing"),
     "utf-16": ((HEAD + "    accuracy: sloppy\n").encode("utf-16"), 2, "accuracy: 'sloppy'"),
+    "url-in-braces": (
+        HEAD + "    robot: {r: {description: package://arm/arm.urdf, joint_states: js}}\n",
+        2,
+        "names and values; quote values that contain ://",
+    ),
     "random-bytes": (bytes((i * i * 31 + i) % 256 for i in range(4096)), 2, "Couldn't parse params file"),
     "zeros": (bytes(4096), 2, "Couldn't parse params file"),
     "wildcard": ("/*:\n  ros__parameters:\n    accuracy: sloppy\n", 2, "accuracy: 'sloppy'"),
