@@ -154,11 +154,17 @@ class FramePipeline:
         return self._transformers[mesh].warnings()
 
     def warnings(self) -> list[str]:
-        """Static positions that are not used, what followers are waiting for, and, if transforms or joints alone move
-        the scene, why there is no frame."""
-        lines = self._assembler.warnings()
-        lines += [line for follower in self._requested.followers for line in follower.warnings()]
-        return lines + (self._requested.warnings() if self._leader is None else [])
+        """Static positions that are not used, and what followers are waiting for."""
+        of_followers = [line for follower in self._requested.followers for line in follower.warnings()]
+        return self._assembler.warnings() + of_followers
+
+    def no_frame(self) -> list[str]:
+        """If transforms or joints alone move the scene: why there is no frame."""
+        return self._requested.warnings() if self._leader is None else []
+
+    def unplaced(self) -> list[str]:
+        """Names of the meshes that transforms move, of which none came."""
+        return self._requested.unplaced()
 
     def _place(self, mesh: str, message: MeshFrame | PoseFrame, new_publisher: bool = False) -> Outcome:
         placed = self._rigid[mesh].place(message) if isinstance(message, PoseFrame) else message

@@ -49,10 +49,23 @@ class RequestedTimes:
             self._latest()
         except NoTransformError as error:
             self._without_time.waits()
+            if error.reported:
+                return []
             account = "" if error.connected else f"; {self.transforms.account(error.source)}"
             return [f"no frame yet: {error}{account}"] if self._without_time.long else []
         self._without_time.ends()
         return []
+
+    def unplaced(self) -> list[str]:
+        """Names of the meshes that no transforms connect with the scene."""
+        return [mesh.name for mesh in self.by_transforms if not self._is_placed(mesh)]
+
+    def _is_placed(self, mesh: MeshSettings) -> bool:
+        try:
+            self.transforms.latest(mesh.frame, self._frame_id)
+        except NoTransformError:
+            return False
+        return True
 
     def _latest(self) -> int | None:
         """The time that all inputs have reached; None: none of them has stamps. Raises NoTransformError."""

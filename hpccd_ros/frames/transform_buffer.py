@@ -21,14 +21,17 @@ class NoTransformError(LookupError):
     """There is no transform; ``final``: none can arrive for this stamp.
 
     ``connected``: transforms connect both frames, but not at this stamp. If they do not, ``source`` is the first
-    frame.
+    frame. ``reported``: another warning gives the cause.
     """
 
-    def __init__(self, text: str, final: bool, connected: bool = True, source: str = "") -> None:
+    def __init__(
+        self, text: str, final: bool, connected: bool = True, source: str = "", reported: bool = False
+    ) -> None:
         super().__init__(text)
         self.final = final
         self.connected = connected
         self.source = source
+        self.reported = reported
 
 
 class _Edge(Samples[Rigid]):

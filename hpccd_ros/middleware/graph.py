@@ -2,6 +2,7 @@
 """The graph of nodes and topics, as discovery knows it in this process."""
 
 import os
+from collections.abc import Iterable
 from typing import Any
 
 from rclpy._rclpy_pybind11 import RCLError
@@ -61,17 +62,33 @@ def endpoint_node(endpoint: Any) -> str:
     return f"of node {shortened(full_name(endpoint.node_name, endpoint.node_namespace))}"
 
 
-def near_topic(node: Node, topic: str, type_name: str) -> str:
-    """For the end of a warning that ``topic`` (full name) has no publisher: one of this type that has some, and is
-    spelled alike or has the same last part; "": there is none."""
-    there = {
-        name
-        for name, types in node.get_topic_names_and_types()
-        if type_name in types and name != topic and node.count_publishers(name)
+def published(node: Node, type_name: str) -> set[str]:
+    """Full names of the topics of this type that have publishers."""
+    return {
+        name for name, types in node.get_topic_names_and_types() if type_name in types and node.count_publishers(name)
     }
-    last = topic.rpartition("/")[2]
-    near = nearest(topic, there) or min((name for name in there if name.rpartition("/")[2] == last), default="")
-    return f"; {near} has publishers: if that is meant, start the node with -r {topic}:={near}" if near else ""
+
+
+def near_published(node: Node, topic: str, type_name: str) -> str:
+    """A topic of this type that has publishers, and is spelled as ``topic`` (full name) or has the same last part, in
+    its namespace if there is one; "": there is none."""
+    everywhere = published(node, type_name) - {topic}
+    namespace, _, last = topic.rpartition("/")
+    for there in ([name for name in everywhere if name.startswith(f"{namespace}/")], everywhere):
+        alike = (name for name in there if name.rpartition("/")[2] == last)
+        if near := nearest(topic, there) or min(alike, default=""):
+            return near
+    return ""
+
+
+def near_topic(node: Node, topic: str, type_name: str, parameters: Iterable[str]) -> str:
+    """For the end of a warning that ``topic`` (full name) has no publisher: `near_published`, and the remedies. The
+    parameters name the topic."""
+    near = near_published(node, topic, type_name)
+    if not near:
+        return ""
+    settings = " and ".join(f"{parameter}: {near}" for parameter in parameters)
+    return f"; {near} has publishers: if that is meant, set {settings}, or start the node with -r {topic}:={near}"
 
 
 def no_node(node: Node, remedy: str, wanted: str = "") -> str:

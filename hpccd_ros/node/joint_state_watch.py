@@ -33,19 +33,18 @@ class JointStateWatch:
         self._received = 0
         self._stamp = -1
         self._advanced = _Useful(clock)
-        self._named = _Useful(clock)
         self._silence = Silence(clock)
         self._clock = clock
         self._names: Sequence[str] = ()
-        self._joints: set[str] = set()
+        self._robots: list[tuple[set[str], _Useful]] = []  # joints of each, and the messages that name one
         self._limits: dict[str, list[_Limits]] = {}  # by joint; robots may share names
         self._outside: dict[str, _Outside] = {}
 
     def use(self, robots: Iterable[Mapping[str, RobotJoint]]) -> None:
         """robots: name -> joint, of each robot that this topic moves and that is known."""
-        self._joints, self._limits, self._outside = set(), {}, {}
+        self._robots, self._limits, self._outside = [], {}, {}
         for joints in robots:
-            self._joints.update(joints)
+            self._robots.append((set(joints), _Useful(self._clock, self._received)))
             for name, joint in joints.items():
                 low, high = joint.limits or (0.0, 0.0)
                 if low < high:  # <limit effort="1" velocity="1"/> has both at 0
@@ -56,10 +55,10 @@ class JointStateWatch:
         if stamp > self._stamp or stamp < self._stamp - 10**9:  # a clock that is set back advances from there
             self._advanced.at(self._received)
             self._stamp = stamp
-        if not self._joints or not self._joints.isdisjoint(names):
-            self._named.at(self._received)
-        else:
-            self._names = names
+        self._names = names
+        for joints, named in self._robots:
+            if not joints or not joints.isdisjoint(names):
+                named.at(self._received)
         for name, position in zip(names, positions, strict=False):
             for limits in self._limits.get(name, ()):
                 if math.isfinite(position) and limits.beyond(position) > _BEYOND:
@@ -83,8 +82,8 @@ class JointStateWatch:
                 problem = f"header.stamp stays at {self._stamp} ns in all messages"
                 remedy = "let the publisher set it to the time of the positions"
             lines.append(f"{self._topic}: {problem}, so the robot does not move; {remedy}")
-        if self._named.lacking(self._received):
-            joints, names = sorted(self._joints), list(self._names)
+        if unnamed := [joints for joints, named in self._robots if named.lacking(self._received)]:
+            joints, names = sorted(set().union(*unnamed)), list(self._names)
             near = next((found for name in names if (found := suggestion(name, joints))), "")
             lines.append(
                 f"{self._topic}: no message names a joint of the robot ({listed(joints)}); the last one names "
@@ -130,10 +129,11 @@ class _Outside(NamedTuple):
 class _Useful:
     """Whether useful messages have stopped while others go on."""
 
-    def __init__(self, clock: Callable[[], float]) -> None:
+    def __init__(self, clock: Callable[[], float], received: int = 0) -> None:
+        """received: messages that came before."""
         self._silence = Silence(clock)
         self._count = 0
-        self._last = 0
+        self._last = received
 
     def at(self, number: int) -> None:
         """The message with this number, from 1 on, was useful."""

@@ -18,7 +18,7 @@ from hpccd_ros.base.quoting import counted
 from hpccd_ros.frames.arrivals import InterleavedSequences, RateLimit
 from hpccd_ros.frames.drops import Input, Reason, Rejection
 from hpccd_ros.frames.pipeline import FramePipeline
-from hpccd_ros.middleware import executors, graph, joint_messages, message_types, qos, transform_topics
+from hpccd_ros.middleware import executors, graph, joint_messages, message_types, qos, topic_names, transform_topics
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.middleware.transform_topics import TransformTopic
 from hpccd_ros.node.accounts import Accounts
@@ -81,11 +81,16 @@ class JointSubscriptions:
 
     def warnings(self) -> list[str]:
         """Topics without a publisher, publishers that are not connected, and joint states that move nothing."""
-        silent = [subscription.topic for subscription in self._subscriptions if not subscription.publishers]
+        robots = robot_parameters.joint_topics(self._settings[ROBOT]).values()
+        silent = {
+            subscription.topic: [f"{ROBOT}.{robot}.joint_states" for robot in moved]
+            for moved, subscription in zip(robots, self._subscriptions, strict=True)
+            if not subscription.publishers
+        }
         lines = [
             f"{topic}: it has no publisher; start one, or let it publish on this topic"
-            f"{graph.near_topic(self._node, topic, message_types.JOINT_STATES)}"
-            for topic in silent
+            f"{graph.near_topic(self._node, topic, message_types.JOINT_STATES, parameters)}"
+            for topic, parameters in silent.items()
         ]
         lines += [line for watch in self._watches.values() for line in watch.warnings()]
         return lines + unconnected(self._subscriptions)
@@ -166,8 +171,7 @@ class TransformSubscriptions:
         understood = transform_topics.understood()
         received = pipeline.transforms.received
         for topic in transform_topics.ALL.values():
-            package = topic.type_name.partition("/")[0]
-            received[self._name(topic)] = 0 if topic in understood else f"not understood ({package} is not installed)"
+            received[self._name(topic)] = 0 if topic in understood else self._not_understood(topic)
         self._subscriptions = [self._subscribe(topic) for topic in understood]
 
     def use(self, pipeline: FramePipeline, by_joints: object) -> None:
@@ -243,6 +247,14 @@ class TransformSubscriptions:
         sent = rejection.sent or Clocks().system()
         self._pipeline.transforms.rejected(None, topic.static, sent)
         self._accounts.rejected(rejection)
+
+    def _not_understood(self, topic: TransformTopic) -> str:
+        package = topic.type_name.partition("/")[0]
+        stamped = transform_topics.ALL[topic_names.TRANSFORMS_STATIC if topic.static else topic_names.TRANSFORMS]
+        return (
+            f"not understood ({package} is not installed; {stamped.type_name.replace('/msg/', '/')} on "
+            f"{self._name(stamped)} works without it)"
+        )
 
     def _name(self, topic: TransformTopic) -> str:
         return self._node.resolve_topic_name(topic.name)

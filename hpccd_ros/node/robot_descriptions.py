@@ -72,7 +72,7 @@ class RobotDescriptions:
         waiting = [
             f"robot {name} waits for its description on {why}"
             for name, subscription in self._subscriptions.items()
-            if name not in self.robots and name not in self._rejected and (why := self._why_silent(subscription))
+            if name not in self.robots and name not in self._rejected and (why := self._why_silent(name, subscription))
         ]
         return waiting + unconnected(self._subscriptions.values())
 
@@ -80,13 +80,14 @@ class RobotDescriptions:
         """Which descriptions cannot be used; the log has each as an error."""
         return [f"robot {name}: {why}" for name, why in self._rejected.items()]
 
-    def _why_silent(self, subscription: InputSubscription) -> str:
+    def _why_silent(self, name: str, subscription: InputSubscription) -> str:
         topic = subscription.topic
         if subscription.publishers:
             return subscription.why_silent(message_types.DESCRIPTION, once=True)
+        parameter = f"{ROBOT}.{name}.description"
         return (
             f"{topic}, which has no publisher; start robot_state_publisher, or name its topic or a URDF file"
-            f"{graph.near_topic(self._node, topic, message_types.DESCRIPTION)}"
+            f"{graph.near_topic(self._node, topic, message_types.DESCRIPTION, [parameter])}"
         )
 
     def _read_files(self, name: str) -> None:

@@ -2,7 +2,7 @@
 """From the topics of the meshes to detections: connects subscriptions, pipeline and detection thread."""
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from rclpy.node import Node
@@ -18,7 +18,7 @@ from hpccd_ros.frames.drops import Reason
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rigid_mesh import mesh_of_file
 from hpccd_ros.frames.types import Outcome, SceneFrame, Topology
-from hpccd_ros.middleware import resources
+from hpccd_ros.middleware import graph, message_types, resources
 from hpccd_ros.node import configuration
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.configuration import Configuration
@@ -155,12 +155,35 @@ class StreamDetection:
 
     def warnings(self) -> list[str]:
         """Warnings about the publishers."""
+        robots = self._configuration.robots
         of_links = [
-            lines[0] + (f"; {counted(len(lines) - 1, 'more link')} of it waiting" if len(lines) > 1 else "")
-            for robot in self._configuration.robots.values()
+            self._by_joint_states([name])
+            + lines[0]
+            + (f"; {counted(len(lines) - 1, 'more link')} of it waiting" if len(lines) > 1 else "")
+            for name, robot in robots.items()
             if (lines := [line for mesh in robot.meshes for line in self._pipeline.awaited_transform(mesh.name)])
         ]
-        return self._subscriptions.warnings() + of_links + self._pipeline.warnings()
+        no_frame = [self._by_joint_states(robots) + line for line in self._pipeline.no_frame()]
+        return self._subscriptions.warnings() + of_links + self._pipeline.warnings() + no_frame
+
+    def _by_joint_states(self, robots: Iterable[str]) -> str:
+        """For the beginning of a warning that transforms are missing: the topic of joint states that may move the first
+        of these robots that waits for transforms; "": there is none."""
+        waiting = {mesh.partition("/")[0] for mesh in self._pipeline.unplaced()}
+        robot = next((name for name in robots if name in waiting), "")
+        topics = graph.published(self._node, message_types.JOINT_STATES) if robot else set()
+        if not topics:
+            return ""
+        here = self._node.resolve_topic_name("x").removesuffix("x")
+        unlike = {
+            name: (not name.startswith(here), robot not in name, not name.endswith("/joint_states"), name)
+            for name in topics
+        }
+        topic = min(topics, key=unlike.__getitem__)
+        return (
+            f"robot {robot} waits for transforms, and {topic} has publishers; if this topic moves it, set "
+            f"{ROBOT}.{robot}.joint_states: {topic}; "
+        )
 
     def silent(self) -> list[str]:
         """Which messages have stopped, or have not begun, to come."""

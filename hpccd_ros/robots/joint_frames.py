@@ -96,7 +96,8 @@ class JointFrames:
         try:
             of_joints = self._history.latest()
         except NoJointStateError as error:
-            raise NoTransformError(f"{self._robot.name}: {error}", final=False) from error
+            text = f"{self._robot.name}: {error}"
+            raise NoTransformError(text, final=False, reported=self._history.misnamed) from error
         if self._base is not None:
             return [of_joints]
         try:
@@ -117,7 +118,8 @@ class JointFrames:
         self._history.clear()
 
     def warnings(self) -> list[str]:
-        waits_long = self._waiting and self._standstill.long
+        # Joint states that name no joint of the robot have a warning of their own.
+        waits_long = self._waiting and self._standstill.long and not self._history.misnamed
         return [f"{self._robot.name} waits: {self._waiting[0].awaited}"] if waits_long else []
 
     def _frames(self, asked: _Asked, transforms: TransformBuffer) -> list[tuple[str, MeshFrame, bool]]:

@@ -57,6 +57,7 @@ class JointHistory:
     def __init__(self, kinematics: Kinematics) -> None:
         self._joints = {name: _Values(name in kinematics.continuous) for name in kinematics.inputs}
         self._named: Sequence[str] = ()  # joints of the last message
+        self._addressed = False  # whether a message named a joint that the robot needs
         self._unusable: dict[str, str] = {}  # joints whose last message had no usable position, and why
         self._last: dict[str, int] = {}  # stamp of the last usable position of each joint, even if forgotten
         self._publishers = JointPublishers(kinematics.continuous)
@@ -76,6 +77,7 @@ class JointHistory:
         are used. Raises RobotError if the message is malformed; then none of it is used."""
         check_lengths(names, positions)
         self._named = names
+        self._addressed = self._addressed or not self._joints.keys().isdisjoint(names)
         if names and not positions:
             self._unusable |= {name: _not_given(name, stamp) for name in names if name in self._joints}
             return Added()
@@ -99,6 +101,11 @@ class JointHistory:
         more = f" and {len(left_out) - MOST_NAMED} more" if len(left_out) > MOST_NAMED else ""
         unusable = f"{why}{more}; positions must be finite; the other joints of the message are used"
         return Added(stray, unusable, contradiction)
+
+    @property
+    def misnamed(self) -> bool:
+        """Whether messages came and none named a joint that the robot needs."""
+        return bool(self._named) and not self._addressed
 
     def clear(self) -> None:
         self._joints = {name: values.emptied() for name, values in self._joints.items()}

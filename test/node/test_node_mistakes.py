@@ -405,13 +405,21 @@ IN_STREAM = {
         BY_JOINTS,
         {"joint_state": (JointState, RELIABLE, [joints("shoulder", k * 10**8) for k in range(1, 1000)])},
         "NS/joint_states: it has no publisher; start one, or let it publish on this topic; NS/joint_state has "
-        "publishers: if that is meant, start the node with -r NS/joint_states:=NS/joint_state",
+        "publishers: if that is meant, set robot.arm.joint_states: NS/joint_state, or start the node with -r "
+        "NS/joint_states:=NS/joint_state",
+    ),
+    "joint-states-without-their-parameter": Mistake(
+        {"robots": ["arm"], "robot.arm.description": "URDF", "frame_id": "world"},
+        {"joint_states": (JointState, RELIABLE, [joints("shoulder", k * 10**8) for k in range(1, 1000)])},
+        "robot arm waits for transforms, and NS/joint_states has publishers; if this topic moves it, set "
+        "robot.arm.joint_states: NS/joint_states; no frame yet: no transform connects 'upper' and 'world'; received: ",
     ),
     "description-in-another-namespace": Mistake(
         {"robots": ["arm"], "frame_id": "world"},
         {"arm/robot_description": (String, LATCHED, [String(data=URDF)])},
         "robot_state_publisher, or name its topic or a URDF file; NS/arm/robot_description has publishers: if that is "
-        "meant, start the node with -r NS/robot_description:=NS/arm/robot_description",
+        "meant, set robot.arm.description: NS/arm/robot_description, or start the node with -r "
+        "NS/robot_description:=NS/arm/robot_description",
     ),
     "no-description": Mistake(
         {"robots": ["arm"], "frame_id": "world"},

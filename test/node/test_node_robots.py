@@ -2,6 +2,7 @@
 """Robots beside a cloth: described by a file or on a topic, moved by joint states or transforms, recorded and computed
 again."""
 
+import itertools
 import subprocess
 import sys
 
@@ -598,6 +599,29 @@ def test_a_summary_that_is_told_after_the_scene_changed_has_the_links_of_its_res
     assert ("cloth", "crane/boom") in {(pair.mesh_a, pair.mesh_b) for pair in heard[0].pairs}
     assert node.contacts(1)[0].mesh_names == ["cloth", *crane.LINKS]
     assert node.peer.statuses["errors"][2]["errors"] == "0"
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_joint_states_of_another_robot_are_one_warning(start_node, alone):
+    scene = {"meshes": [""], "ignored_pairs": [""]} if alone else {}
+    node = start_node({**parameters(**JOINTS), **scene})
+    describe(node)
+    joints = node.peer.publisher(JointState, "joint_states")
+    if not alone:
+        node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    stamps = itertools.count(1)
+
+    def told():
+        message = crane.joint_state(0, stamp := next(stamps))
+        message.name = [f"left_{name}" for name in message.name]
+        joints.publish(message)
+        if not alone:
+            cloth(node, stamp)
+        return "no message names a joint of the robot" in node.peer.statuses["frames"][1]
+
+    node.wait_until(told, "the warning")
+    text = node.peer.statuses["frames"][1]
+    assert "crane waits" not in text and "no frame yet" not in text
 
 
 @pytest.mark.parametrize("by", ["tf", "joints"])

@@ -11,7 +11,7 @@ from node_process import assert_same_contacts
 from waving_sheet import scene_of
 
 from hpccd_core.rigid.transform import Rigid
-from hpccd_ros.middleware import qos
+from hpccd_ros.middleware import qos, transform_topics
 
 
 def send(node, k, frame_id):
@@ -106,10 +106,15 @@ def test_who_waits_for_a_transform_is_told_what_came(start_node):
         node.wait_until(lambda: all(text in node.peer.statuses["frames"][1] for text in texts), str(texts))
 
     send(node, 0, "left/hand")
+    without_tf2 = (
+        "not understood (tf2_msgs is not installed; geometry_msgs/TransformStamped on "
+        f"{node.namespace}/transforms works without it)"
+    )
     told(
         "net waits for a transform: no transform connects 'left/hand' and 'world'; received: ",
         "/transforms no messages",
         "/transforms_static no messages",
+        f"/tf {'no messages' if len(transform_topics.understood()) == 4 else without_tf2}",
         "/tf_static ",
         "; frames known: none",
     )

@@ -149,6 +149,16 @@ def test_names_of_no_joint(watch, clock):
     assert watch.warnings() == []
 
 
+def test_names_of_one_of_two_robots(watch, clock):
+    watch.use([{"elbow": joint("elbow")}, {"knee": joint("knee")}])
+    for k in range(4):
+        watch.receive(k, ["elbow"])
+        assert watch.warnings() == [] or k == 3
+        clock.now += 1.0
+    (line,) = watch.warnings()
+    assert "no message names a joint of the robot (knee); the last one names elbow" in line
+
+
 def test_before_a_robot_is_known_no_name_is_wrong(clock):
     watch = JointStateWatch("/joint_states", clock)
     for k in range(9):
