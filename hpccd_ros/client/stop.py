@@ -15,11 +15,14 @@ from std_msgs.msg import Bool
 from hpccd_ros.base.clocks import CLOCK_ERROR, Clocks, ClockWatch
 from hpccd_ros.base.quoting import counted
 from hpccd_ros.client.topics import STOP_TIMEOUT, STOP_TOPIC, stop_qos
+from hpccd_ros.middleware import graph, message_types
 
 # Fraction of the time-out, the same in the node: silence reads as true before the time-out is over.
 _IN_TIME = 0.95
 # Times the node's time-out, above which a longer one is reported.
 _FAR_LONGER = 4.0
+# s between two looks for a topic that may be meant, while there is no publisher.
+_SEARCH_EVERY = 1.0
 # Times per time-out at which a timer checks whether it has passed.
 _LOOKS = 4
 
@@ -95,6 +98,7 @@ class StopListener:
         self._sent_true = 0  # when the newest message with true was sent
         self._alive: int | None = None  # None: DDS has not told yet
         self._lost = f"{node.resolve_topic_name(topic)}: no message yet"
+        self._elsewhere = ""  # for that reason: a topic that may be meant
         self._notified = True  # to on_change
         events = SubscriptionEventCallbacks(
             deadline=self._on_deadline, liveliness=self._on_liveliness, incompatible_qos=self._on_incompatible
@@ -102,9 +106,9 @@ class StopListener:
         on_message: Any = self._on_message  # rclpy's types know no second argument
         self._subscription = node.create_subscription(Bool, topic, on_message, profile, event_callbacks=events)
         self._topic: str = self._subscription.topic_name
-        self._timer = node.create_timer(
-            self._timeout / _LOOKS, self._notify, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = node.create_timer(self._timeout / _LOOKS, self._notify, clock=steady)
+        self._search: Any = node.create_timer(_SEARCH_EVERY, self._look_elsewhere, clock=steady)
 
     @property
     def stop(self) -> bool:
@@ -120,6 +124,7 @@ class StopListener:
         """End the subscription: ``stop`` is true from now on."""
         self._lose(f"{self._topic}: the listener was closed")
         self._node.destroy_timer(self._timer)
+        self._node.destroy_timer(self._search)
         self._node.destroy_subscription(self._subscription)
 
     def _why(self) -> str | None:
@@ -130,7 +135,7 @@ class StopListener:
                 self._sent, self._lost = None, clocks  # its age is unknown now
                 self._begun = 0
             if self._sent is None:
-                return self._lost
+                return self._lost + self._elsewhere
             age = 1e-9 * (system - self._sent)
             if age < -self._clock_error:
                 return f"{self._topic}: the last message was sent {-age:.3g} s in the future"
@@ -172,13 +177,24 @@ class StopListener:
 
     def _on_liveliness(self, event: Any) -> None:
         with self._lock:
-            self._alive = event.alive_count
+            self._alive, self._elsewhere = event.alive_count, ""
         if event.alive_count_change > 0:
             self._compare_timeouts()
         if event.alive_count < self._publishers:
             self._lose(self._too_few(event.alive_count))
         else:
             self._notify()
+
+    def _look_elsewhere(self) -> None:
+        """As long as no publisher was there: find another topic that may be meant."""
+        if self._alive is not None:
+            self._search.cancel()
+            return
+        published = self._node.count_publishers(self._topic) > 0
+        near = "" if published else graph.near_published(self._node, self._topic, message_types.STOP)
+        found = f"; it has no publisher, and {near} has: if that is meant, give topic={near!r}" if near else ""
+        with self._lock:
+            self._elsewhere = found if self._alive is None else ""
 
     def _compare_timeouts(self) -> None:
         """Warn where the listener waits much longer than the node promises: 500 is often meant as milliseconds."""

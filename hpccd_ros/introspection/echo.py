@@ -53,7 +53,7 @@ def main(args) -> int:
             message_type = message_class(type_name)
         except LookupError as error:
             raise UserError(f"{topic}: {error}; install the package of this message type") from error
-        _Printer(node, topic, message_type, args).run(stop)
+        _Printer(node, topic, type_name, message_type, args).run(stop)
     return 0
 
 
@@ -106,9 +106,10 @@ def _type(node: Node, topic: str, wait: float, stop: Sequence) -> str:
 class _Printer:
     """Asks for what the publishers offer, now and later: DDS does not connect a publisher that offers less."""
 
-    def __init__(self, node: Node, topic: str, message_type: type, args) -> None:
+    def __init__(self, node: Node, topic: str, type_name: str, message_type: type, args) -> None:
         self._node = node
         self._topic = topic
+        self._type_name = type_name
         self._message_type = message_type
         self._args = args
         self._waiting: list[Any] = []
@@ -130,9 +131,11 @@ class _Printer:
             self._waiting.clear()
             if not printed and time.monotonic() > quiet_at:
                 quiet_at = float("inf")
-                publishers = counted(self._node.count_publishers(self._topic), "publisher")
-                text = f"{self._topic}: no message yet; it has {publishers}{self._switched_off()}; Ctrl-C ends"
-                print(text, file=sys.stderr, flush=True)
+                count = self._node.count_publishers(self._topic)
+                near = "" if count else graph.near_published(self._node, self._topic, self._type_name)
+                publishers = f"{counted(count, 'publisher')}{self._switched_off()}"
+                text = f"{self._topic}: no message yet; it has {publishers}; Ctrl-C ends"
+                print(f"{text}; did you mean {near}?" if near else text, file=sys.stderr, flush=True)
 
     def _switched_off(self) -> str:
         """The end of a message: the publisher's parameter that is false, with the remedy."""

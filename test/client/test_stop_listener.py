@@ -116,6 +116,18 @@ def test_true_unless_somebody_says_false(place):
     assert listener.stop and listener.reason == f"{place.namespace}/stop: the listener was closed"
 
 
+def test_a_publisher_in_another_namespace_is_named(place):
+    listener = place.listener()
+    elsewhere = Speaker(f"{place.namespace}/cell1")
+    place.speakers.append(elsewhere)
+    here, there = f"{place.namespace}/stop", f"{place.namespace}/cell1/stop"
+    hint = f"{here}: no message yet; it has no publisher, and {there} has: if that is meant, give topic='{there}'"
+    place.until(lambda: listener.reason == hint, "the topic that has a publisher")
+    assert listener.stop
+    place.speaker()
+    place.until(lambda: not listener.stop, "false")
+
+
 def test_silence_is_true(place):
     """Of a publisher whose process lives and whose thread does not: its DDS still sends signs of life."""
     listener, speaker = place.listener(), place.speaker()

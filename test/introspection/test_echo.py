@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hpccd echo`: what it prints is YAML of the message, whatever the publishers offer."""
 
+import os
+import signal
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -8,6 +12,8 @@ import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from hpccd.msg import MeshVertices
+from sources import SOURCES
+from std_msgs.msg import Bool
 from waving_sheet import sheet_faces, sheet_positions
 
 from hpccd_ros.introspection import message_text
@@ -88,6 +94,20 @@ def test_a_topic_that_is_not_there(start_node, hpccd):
     assert f"did you mean {node.namespace}/contacts?" in done.stderr
     done = hpccd("echo", "1contacts")
     assert done.returncode == 2 and "'1contacts': not a topic name; write it as /contacts" in done.stderr
+
+
+def test_a_topic_with_subscribers_only(start_node):
+    """A subscription keeps the topic in the graph, so that it is not found missing."""
+    peer = start_node({"meshes": ["cloth"]}).peer.node
+    peer.create_publisher(Bool, "stop", qos.stop(0.5))
+    topic = peer.create_subscription(Bool, "cell1/stop", lambda message: None, qos.stop(0.5)).topic_name
+    command = [sys.executable, "-m", "hpccd_ros.cli", "echo", topic, "--wait", "60"]
+    environment = {**os.environ, "PYTHONPATH": SOURCES}
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment) as echo:
+        says = next(line for line in echo.stderr if "no message yet" in line)
+        echo.send_signal(signal.SIGINT)
+    near = f"{peer.get_namespace()}/stop"
+    assert says == f"{topic}: no message yet; it has 0 publishers; Ctrl-C ends; did you mean {near}?\n"
 
 
 def test_topics_are_listed(start_node, hpccd):
