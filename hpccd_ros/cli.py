@@ -73,9 +73,15 @@ def main(argv=None) -> int:
         interrupts.close()
 
 
+class _Interrupted(KeyboardInterrupt):
+    """A class of its own: once KeyboardInterrupt itself has left exec(), by which dataclasses are made, `python -m`
+    ends by SIGINT instead of with the exit status."""
+
+
 class _Interrupts:
-    """Python's handler of SIGINT, which also records the signal, for SIGTERM and SIGHUP too: by default these would end
-    the process before it removes incomplete files. A signal that is ignored or has another handler keeps that."""
+    """Raises KeyboardInterrupt, as Python's handler of SIGINT does, and records the signal, for SIGTERM and SIGHUP too:
+    by default these would end the process before it removes incomplete files. A signal that is ignored or has another
+    handler keeps that."""
 
     DEFAULTS = {
         signal.SIGINT: signal.default_int_handler,
@@ -95,7 +101,7 @@ class _Interrupts:
 
     def _response(self, number, frame):
         self.came = True
-        raise KeyboardInterrupt
+        raise _Interrupted
 
 
 class _Parser(argparse.ArgumentParser):

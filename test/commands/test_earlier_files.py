@@ -144,6 +144,18 @@ def test_an_interrupt_leaves_the_earlier_file(folder, case, number):
     assert _content(folder) == before
 
 
+def test_an_interrupt_while_python_makes_a_class_has_its_exit_status(tmp_path):
+    (tmp_path / "made.py").write_text(
+        "import sys; from hpccd_ros import cli; interrupts = cli._Interrupts()\n"
+        "try: exec('import os, signal; os.kill(os.getpid(), signal.SIGINT)')\n"
+        "except KeyboardInterrupt: sys.exit(130)\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": SOURCES}
+    words = [sys.executable, "-m", "made"]
+    done = subprocess.run(words, cwd=tmp_path, env=environment, preexec_fn=_defaults, timeout=PATIENCE)
+    assert done.returncode == 130
+
+
 def _measures(process) -> bool:
     """Whether the process has used more CPU time than its imports take."""
     fields = open(f"/proc/{process.pid}/stat").read().rpartition(")")[2].split()
