@@ -111,7 +111,7 @@ class Mistakes:
     @staticmethod
     def late(self, start, end):
         step = super(hc.Detector, self).collision_free_step(start, end)
-        return step if step in (0, 1) else np.nextafter(step, 1) + 1e-11
+        return step if step in (0, 1) else min(np.nextafter(step, 1) + 1e-11, 1.0)
 
     @staticmethod
     def early(self, start, end):

@@ -67,7 +67,7 @@ def test_changed_from_step_to_step_recorded_and_verified(start_node, tmp_path, h
         stream.expect(features)
     status = stream.node.peer.statuses["detection"][2]
     assert status["features"] == "vertex_face, edge_edge"
-    for bad, reason in (([""], "features: empty"), (["faces"], "use one of vertex_face, edge_edge"), ("x", "type")):
+    for bad, reason in (([""], "features: empty"), (["faces"], "use one of vertex_face, edge_edge"), ("x", "expected")):
         response = stream.set("features", bad)
         assert not response.successful and reason in response.reason, response.reason
     response = stream.set("pair_features", ["cloth:net:vertex_face"])

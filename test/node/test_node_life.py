@@ -310,7 +310,7 @@ def test_options_change_at_run_time(start_node):
         ("accuracy", "sloppy", "is not valid; use one of"),
         ("frame_queue", 7, "read-only"),
         ("max_contacts", -1, "range"),
-        ("threads", "four", "type"),
+        ("threads", "four", "expected int"),
     ]:
         result = set_parameter(node, name, value)
         assert not result.successful and reason in result.reason, (name, result.reason)

@@ -58,7 +58,7 @@ def test_given_changed_and_replayed(start_node, tmp_path, hpccd):
     for name, value, reason in (
         ("pair_separation", ["cloth:net:0.1"], "'0.002' contradicts pair_separation: 'cloth:net:0.1'; leave one out"),
         ("pairs.between.separation", -1.0, "range"),
-        ("pairs.between.separation", "wide", "type"),
+        ("pairs.between.separation", "wide", "expected float"),
         ("pairs.between.accuracy", "fast", "pairs.between.accuracy: read-only while the node is configured"),
         ("pairs.between.meshes", ["cloth"], "pairs.between.meshes: read-only while the node is configured"),
         ("pairs.new.separation", 1e-3, "start it with pairs.new.meshes, or name both meshes in pair_separation"),

@@ -91,7 +91,7 @@ def test_given_at_the_start_and_changed_from_step_to_step(start_node):
     [
         ("minimum_separation", -1.0, "range"),
         ("minimum_separation", math.nan, "minimum_separation out of range Min: 0.0"),
-        ("minimum_separation", "wide", "type"),
+        ("minimum_separation", "wide", "expected float"),
         ("pair_separation", ["cloth:wall:0.1"], "pair_separation: 'cloth:wall:0.1' must be NAME:NAME:DISTANCE with"),
         ("pair_separation", ["cloth:net:-1"], "a distance from 0 to 1e+150"),
         ("pair_separation", ["cloth:net:1", "net:cloth:2"], "contradicts 'cloth:net:1'"),
