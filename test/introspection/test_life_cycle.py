@@ -11,7 +11,7 @@ def node(start_node):
 
 @pytest.fixture
 def lifecycle(hpccd, node):
-    return lambda *arguments: hpccd("lifecycle", *arguments, "--node", f"{node.namespace}/hpccd")
+    return lambda *arguments: hpccd("lifecycle", *arguments, "--node", f"{node.namespace}/hpccd", "--wait", "30")
 
 
 def test_transitions(node, lifecycle):

@@ -13,7 +13,7 @@ def node(start_node):
 
 @pytest.fixture
 def param(hpccd, node):
-    return lambda *arguments: hpccd("param", *arguments, "--node", f"{node.namespace}/hpccd")
+    return lambda *arguments: hpccd("param", *arguments, "--node", f"{node.namespace}/hpccd", "--wait", "30")
 
 
 def test_get_and_list(param):

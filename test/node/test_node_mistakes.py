@@ -467,7 +467,9 @@ def test_mistakes_in_streams(start_node, tmp_path, names):
         outputs = [f"{name}: {node.output()}" for name, node, _, _ in running if name in lacking]
         raise AssertionError(f"not said: {list(lacking)}\n" + "\n".join(outputs)) from None
     for _, node, _, says in running:
-        assert node.output().count(says) == 1, "once an episode"
+        lines = [line for line in node.output().splitlines() if says in line]
+        # Rejected messages have a second line, which counts them, after some seconds: on a slow machine.
+        assert sum("more of these in between" not in line for line in lines) == 1, "once an episode"
         node.wait_until(functools.partial(_reported, node, says), f"{says} on /diagnostics")
 
 

@@ -90,5 +90,5 @@ def test_a_recorder_says_what_it_waits_for(start_node, children, hpccd, tmp_path
     text = f"{node.namespace}/contacts: no publisher yet; configure {name} (hpccd lifecycle), or "
     children.wait(lambda: recorder.has_printed(text), "the recorder did not say that it waits", PATIENCE)
     assert not recorder.has_printed("recording ")
-    assert hpccd("lifecycle", "configure", "--node", name).returncode == 0
+    assert hpccd("lifecycle", "configure", "--node", name, "--wait", WAIT).returncode == 0
     children.wait(lambda: recorder.has_printed(f"recording {name} into "), "the recorder did not begin", PATIENCE)
