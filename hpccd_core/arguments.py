@@ -72,7 +72,7 @@ def hide_unnamed(function: Function) -> Function:
 
 
 def reject_unnamed(query: str, remedy: str) -> NoReturn:
-    """Raise TypeError for an argument too many, among which `stream` once was."""
+    """Raise TypeError for an argument too many, which may be a stream."""
     raise TypeError(f"{query}: takes {remedy}; a CUDA stream is given by name, as stream=")
 
 
