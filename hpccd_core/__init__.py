@@ -16,6 +16,7 @@ from .detector import Detector
 from .device_results import DeviceContacts, DeviceIntersections, DeviceProximity
 from .devices import backends, gpu_status
 from .elementary import test_edge_edge, test_vertex_face
+from .free_motion import CollisionFreeMotion
 from .mesh_files.errors import MeshFileError
 from .mesh_files.load import load_mesh
 from .prepared import PreparedDetection
@@ -25,6 +26,7 @@ from .scene import Scene
 
 __all__ = [
     "Cancelled",
+    "CollisionFreeMotion",
     "Contacts",
     "Detector",
     "DeviceArray",

@@ -98,6 +98,9 @@ class _Contacts(TypedDict):
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
     closest: NDArray[np.float64]
+    vertices: NDArray[np.uint32]
+    weights: NDArray[np.float64]
+    approach: NDArray[np.float64]
     first_toc: float
     hash: int
     slices: NotRequired[_Slices]  # of several worlds
@@ -108,6 +111,9 @@ class _Proximity(TypedDict):
     ee: NDArray[np.uint32]
     ee_distance: NDArray[np.float64]
     closest: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    vertices: NDArray[np.uint32]
+    weights: NDArray[np.float64]
     hash: int
     slices: NotRequired[_Slices]  # of several worlds
 
@@ -116,7 +122,17 @@ class _Intersections(TypedDict):
     hash: int
     slices: NotRequired[_Slices]  # of several worlds
 
-_Gap = tuple[int, int, float, str, list[int], NDArray[np.float64]]
+_Gap = tuple[
+    int,
+    int,
+    float,
+    str,
+    list[int],
+    NDArray[np.float64],
+    NDArray[np.uint32],
+    NDArray[np.float64],
+    NDArray[np.float64],
+]
 
 class Positions:
     @overload
@@ -173,6 +189,9 @@ class _OnDevice(TypedDict):  # result of every query; arrays that a query does n
     points: DeviceArray
     normals: DeviceArray
     closest: DeviceArray
+    vertices: DeviceArray
+    weights: DeviceArray
+    approach: DeviceArray
     first_toc: float
     hash: int
     slices: _SlicesOnDevice | None
@@ -186,6 +205,7 @@ class Options:
     points: bool
     normals: bool
     closest: bool
+    weights: bool
     minimum_separation: float
     method: Method
     restructure: bool
@@ -203,6 +223,9 @@ class Detector:
     def detect(self, vertices_t0: _Given, vertices_t1: _Given) -> _Contacts | _OnDevice: ...
     def prepare(self, vertices_t0: _Given, vertices_t1: _Given, room: float) -> PreparedDetection: ...
     def collision_free_steps(self, vertices_t0: _Given, vertices_t1: _Given) -> NDArray[np.float64]: ...
+    def collision_free_motion(
+        self, vertices_t0: _Given, vertices_t1: _Given, groups: NDArray[np.int64]
+    ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.uint32]]: ...
     def proximity(self, vertices: _Given, distance: float) -> _Proximity | _OnDevice: ...
     def intersections(self, vertices: _Given) -> _Intersections | _OnDevice: ...
     def distances(self, vertices: _Given) -> list[_Gap]: ...

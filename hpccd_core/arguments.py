@@ -335,6 +335,18 @@ def _is_list_of_meshes(value: object) -> TypeGuard[Sequence[object]]:
     return all(isinstance(mesh, np.ndarray) and mesh.ndim == 2 for mesh in value)
 
 
+def group_numbers(value: object, n_vertices: int) -> NDArray[np.int64]:
+    """(V,) int64, each at least -1."""
+    array = _array("groups", value)
+    if array.dtype.kind not in "iu":
+        raise TypeError(f"groups: expected integers, got {array.dtype}; -1 is for a vertex on its own")
+    if array.shape != (n_vertices,):
+        raise ValueError(f"groups: expected shape ({n_vertices},), a number for each vertex, got {array.shape}")
+    if array.size and array.min() < -1:
+        raise ValueError(f"groups: numbers from 0, or -1 for a vertex on its own, got {array.min()}")
+    return np.require(array, np.int64, ["C", "A"])
+
+
 def _of_meshes(name: str, value: Mapping[Any, Any], shape: tuple[int, ...], layout: MeshLayout) -> NDArray[Any]:
     """The arrays of all meshes as one, in the order in which the meshes were added."""
     there = ", ".join(layout.mesh_names) or "none"

@@ -5,16 +5,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .mesh_layout import Indices, MeshLayout
-from .results import WithSides, output
+from .results import OUTPUT_ARRAYS, WithSides, output
 from .worlds import PairsOfWorlds, Slices
-
-#: Shape of a row of each output.
-ROWS: dict[str, tuple[int, ...]] = {"points": (3,), "normals": (3,), "closest": (2, 3)}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -39,7 +37,8 @@ class Contacts(WithSides, PairsOfWorlds):
     hash : int
         64-bit; the same for the same contacts on any backend and with any number of threads.
     outputs : dict of str to ndarray
-        The outputs that the detector was asked for; `points`, `normals` and `closest` read it.
+        The outputs that the detector was asked for; `points`, `normals`, `closest`, `vertices`, `weights` and
+        `approach` read it.
 
     Notes
     -----
@@ -72,7 +71,7 @@ class Contacts(WithSides, PairsOfWorlds):
     ee_toc: NDArray[np.float64]
     first_toc: float
     hash: int
-    outputs: dict[str, NDArray[np.float64]] = dataclasses.field(default_factory=dict)
+    outputs: dict[str, NDArray[Any]] = dataclasses.field(default_factory=dict)
     slices: Slices | None = dataclasses.field(default=None, repr=False)
     layout: MeshLayout | None = dataclasses.field(default=None, repr=False, compare=False)
 
@@ -106,6 +105,81 @@ class Contacts(WithSides, PairsOfWorlds):
         Raises `OutputNotComputed` unless the detector was made with outputs=("closest",).
         """
         return output(self.outputs, "closest")
+
+    @property
+    def vertices(self) -> Indices:
+        """(N+M, 4) uint32, vertex-face first: scene-wide vertices of each pair, v f0 f1 f2, or a0 a1 b0 b1.
+
+        Raises `OutputNotComputed` unless the detector was made with outputs=("weights",).
+        """
+        return output(self.outputs, "vertices")
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """(N+M, 4) float64, vertex-face first: the weights of `vertices` at the time of impact; each row sums to 0.
+
+        Vertex-face: 1, -l0, -l1, -l2 with the barycentric coordinates l of the point on the face. Edge-edge: -(1 - s),
+        -s, 1 - u, u with the place s of the point on edge a, from a0 to a1, and u on edge b. The sum of weights times
+        positions at the time of impact is the vector from face to vertex, or from edge a to edge b: zero in plain
+        contact, the gap with a minimum separation. Coordinates and places are in [0, 1]. For parallel edges they are
+        those of the middle of the stretch they share. Raises `OutputNotComputed` unless the detector was made with
+        outputs=("weights",).
+        """
+        return output(self.outputs, "weights")
+
+    @property
+    def approach(self) -> NDArray[np.float64]:
+        """(N+M,) float64, vertex-face first: how fast the gap grows at the time of impact, in coordinates per step.
+
+        It is the normal times the sum of weights times motions: negative while the features approach each other. It is
+        0 if they only graze each other, as at a double root, within rounding errors of the motion, or if the normal is
+        zero. Contacts at t = 0 may be moving apart. Raises `OutputNotComputed` unless the detector was made with
+        outputs=("weights",).
+        """
+        return output(self.outputs, "approach")
+
+    def toc_gradients(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Derivatives of the times of impact with respect to the positions at both ends of the step.
+
+        Returns
+        -------
+        g0, g1 : ndarray, shape (N+M, 4, 3), float64
+            Derivatives with respect to the positions of `vertices` at the start of the step and at its end. NaN where
+            the time is 0 or `approach` is 0: there the time has no derivative.
+
+        Raises
+        ------
+        OutputNotComputed
+            Unless the detector was made with outputs=("normals", "weights").
+
+        Notes
+        -----
+        By the implicit function theorem for gap(toc) = separation: d toc / d x0 = -(1 - toc) w n / approach and d toc /
+        d x1 = -toc w n / approach, with the weights w and the normal n. Where the nearest points leave a face's
+        interior or an edge, the time has derivatives on both sides; this is one of them.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import hpccd_core as hc
+        >>> scene = hc.Scene()
+        >>> _ = scene.add_mesh("falling", [[0, 1, 2]])
+        >>> _ = scene.add_mesh("ground", [[0, 1, 2]], static=True)
+        >>> start = np.array([[0, 0, 1], [1, 0, 3], [0, 1, 3], [-5, -5, 0], [5, -5, 0], [0, 5, 0]], float)
+        >>> end = start.copy()
+        >>> end[:3, 2] -= 2
+        >>> contacts = hc.Detector(scene, outputs=("normals", "weights")).detect(start, end)
+        >>> contacts.vertices.tolist(), contacts.weights.tolist(), contacts.approach.tolist()
+        ([[0, 3, 4, 5]], [[1.0, -0.25, -0.25, -0.5]], [-2.0])
+        >>> g0, g1 = contacts.toc_gradients()
+        >>> g0[0, 0].tolist(), g1[0, 0].tolist()  # the vertex
+        ([0.0, 0.0, 0.25], [0.0, 0.0, 0.25])
+        """
+        arms = self.weights[:, :, None] * self.normals[:, None, :]
+        toc, approach = np.concatenate([self.vf_toc, self.ee_toc]), self.approach
+        per_approach = np.full(len(self), np.nan)
+        np.divide(-1, approach, out=per_approach, where=(toc > 0) & (approach != 0))
+        return ((1 - toc) * per_approach)[:, None, None] * arms, (toc * per_approach)[:, None, None] * arms
 
     @property
     def first_tocs(self) -> NDArray[np.float64]:
@@ -170,7 +244,7 @@ class Contacts(WithSides, PairsOfWorlds):
         -------
         Contacts
         """
-        empty = np.empty
+        empty, asked = np.empty, tuple(outputs)
         return cls(
             vf=empty((0, 2), np.uint32),
             vf_toc=empty(0),
@@ -178,7 +252,11 @@ class Contacts(WithSides, PairsOfWorlds):
             ee_toc=empty(0),
             first_toc=np.inf,
             hash=0,
-            outputs={name: empty((0, *ROWS[name])) for name in outputs},
+            outputs={
+                name: empty((0, *array.row), array.dtype)
+                for name, array in OUTPUT_ARRAYS.items()
+                if array.asked in asked
+            },
             slices=None if worlds is None else Slices.of_none(worlds),
             layout=layout,
         )

@@ -85,8 +85,9 @@ class Detector(
         Number of CPU threads; 0 for all cores.
     report : {"all", "first", "any"}
         All contacts, those at the earliest time of impact, or any one, not necessarily the earliest.
-    outputs : iterable of {"points", "normals", "closest"}
-        What to compute for each contact beside its features and its time of impact.
+    outputs : iterable of {"points", "normals", "closest", "weights"}
+        What to compute for each contact beside its features and its time of impact; "weights" gives `vertices`,
+        `weights` and `approach`.
     minimum_separation : float
         Report features that come within this distance, in the unit of the coordinates; 0 reports only contact. Keep
         it below the distance of neighbours within each mesh (distances() at rest), or these are always reported.
@@ -253,6 +254,7 @@ class Detector(
         options.points = "points" in self._outputs
         options.normals = "normals" in self._outputs
         options.closest = "closest" in self._outputs
+        options.weights = "weights" in self._outputs
         options.minimum_separation = minimum_separation
         options.method = getattr(_core.Method, method)
         options.restructure = arguments.flag("restructure", restructure)

@@ -79,6 +79,21 @@ class _PairsOnDevice(_OnDevice):
         return output(self.outputs, "closest")
 
     @property
+    def normals(self) -> DeviceArray:
+        """(N+M, 3) float64, as in Contacts and Proximity."""
+        return output(self.outputs, "normals")
+
+    @property
+    def vertices(self) -> DeviceArray:
+        """(N+M, 4) uint32, as in Contacts and Proximity."""
+        return output(self.outputs, "vertices")
+
+    @property
+    def weights(self) -> DeviceArray:
+        """(N+M, 4) float64, as in Contacts and Proximity."""
+        return output(self.outputs, "weights")
+
+    @property
     def vf_offsets(self) -> DeviceArray:
         """(W+1,) int64: the vertex-face pairs of world k are the rows vf_offsets[k] to vf_offsets[k + 1]."""
         return self._offsets("vf", self.vf)
@@ -129,9 +144,9 @@ class DeviceContacts(_PairsOnDevice):
         return output(self.outputs, "points")
 
     @property
-    def normals(self) -> DeviceArray:
-        """(N+M, 3) float64, as in Contacts."""
-        return output(self.outputs, "normals")
+    def approach(self) -> DeviceArray:
+        """(N+M,) float64, as in Contacts."""
+        return output(self.outputs, "approach")
 
     @property
     def first_tocs(self) -> DeviceArray:
@@ -246,7 +261,7 @@ def contacts_of(found: dict[str, Any], outputs: tuple[str, ...], layout: MeshLay
 
 def proximity_of(found: dict[str, Any], outputs: tuple[str, ...], layout: MeshLayout | None) -> DeviceProximity:
     """Proximity from what the core returns."""
-    for name in ("ef", "points", "normals", "first_toc"):
+    for name in ("ef", "points", "approach", "first_toc"):
         del found[name]
     vf, ee = found.pop("vf_values"), found.pop("ee_values")
     return DeviceProximity(vf_distance=vf, ee_distance=ee, **with_outputs(found, outputs), layout=layout)

@@ -6,13 +6,14 @@ from __future__ import annotations
 from typing import Any, Generic, NoReturn, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from . import _core, arguments, device_arrays, device_results
 from ._core import Positions as CorePositions
 from .array_types import DeviceArrayLike, Positions, Stream
 from .contacts import Contacts
 from .device_arrays import DevicePositions
+from .free_motion import CollisionFreeMotion
 from .mesh_layout import MeshLayout
 from .options import Results
 from .prepared import PreparedDetection
@@ -29,6 +30,7 @@ class MotionQueries(Generic[MotionResult, StepResult]):
     results: Results
     _shape: tuple[int, ...]  # of all positions
     _rows: int
+    n_vertices: int
     _core: _core.Detector
     _layout: MeshLayout
     _outputs: tuple[str, ...]
@@ -97,12 +99,67 @@ class MotionQueries(Generic[MotionResult, StepResult]):
         times: NDArray[np.float64] = self._of_motion("collision_free_steps", vertices_t0, vertices_t1, stream)
         return cast(StepResult, float(times[0]) if self.worlds is None else times)
 
+    @arguments.hide_unnamed
+    def collision_free_motion(
+        self,
+        vertices_t0: Positions,
+        vertices_t1: Positions,
+        groups: ArrayLike | None = None,
+        *unnamed: NoReturn,
+        stream: Stream = None,
+    ) -> CollisionFreeMotion:
+        """Shorten the motion of each vertex until nothing touches.
+
+        Parameters
+        ----------
+        vertices_t0, vertices_t1 : Positions, shape (V, 3)
+        groups : array_like, shape (V,), integer, optional
+            Vertices with the same number share one factor; -1 is for a vertex on its own. For meshes that only
+            translate: a group that rotates would change its shape.
+        stream : Stream, optional
+
+        Returns
+        -------
+        CollisionFreeMotion
+            In host memory, also with results="device".
+
+        Raises
+        ------
+        TypeError, ValueError
+            For invalid groups.
+
+        Notes
+        -----
+        No factor is below 0.9 times `collision_free_step`, unless rounding leaves no such position. The result is
+        tested from the start, on the rounded numbers that are returned, at the detector's accuracy. Vertices that do
+        not move have the factor 1. The CPU computes it, on every backend.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import hpccd_core as hc
+        >>> scene = hc.Scene()
+        >>> _ = scene.add_mesh("falling", [[0, 1, 2]])
+        >>> _ = scene.add_mesh("ground", [[0, 1, 2]], static=True)
+        >>> start = np.array([[0, 0, 1], [1, 0, 3], [0, 1, 3], [-5, -5, 0], [5, -5, 0], [0, 5, 0]], float)
+        >>> end = start.copy()
+        >>> end[:3, 2] -= 2
+        >>> motion = hc.Detector(scene).collision_free_motion(start, end)
+        >>> motion.factors.round(6).tolist()  # only the first vertex falls on the ground
+        [0.45, 1.0, 1.0, 1.0, 1.0, 1.0]
+        """
+        if unnamed:
+            arguments.reject_unnamed("collision_free_motion", "two arrays of positions and the groups")
+        numbers = np.empty(0, np.int64) if groups is None else arguments.group_numbers(groups, self.n_vertices)
+        vertices, factors, stuck = self._of_motion("collision_free_motion", vertices_t0, vertices_t1, stream, numbers)
+        return CollisionFreeMotion(vertices.reshape(self._shape), factors.reshape(self._shape[:-1]), stuck)
+
     def prepare(
         self, vertices_t0: DeviceArrayLike, vertices_t1: DeviceArrayLike, room: float = 2.0, *, stream: Stream = None
     ) -> PreparedDetection:
         """A detection of these two device arrays that a CUDA graph can hold.
 
-        Needs results="device" and no outputs. Accuracy, pairs and separations are those of this call.
+        Needs results="device". Accuracy, pairs and separations are those of this call.
 
         Parameters
         ----------
@@ -129,25 +186,29 @@ class MotionQueries(Generic[MotionResult, StepResult]):
         room = arguments.length("room", room)
         ends = self._places(vertices_t0, vertices_t1, device_arrays.stream_number(stream))
         prepared = self._core.prepare(*self._for_core(*ends), room)
-        return PreparedDetection(prepared, self.worlds, (vertices_t0, vertices_t1), self._layout)
+        ends_of_caller = (vertices_t0, vertices_t1)
+        return PreparedDetection(prepared, self.worlds, ends_of_caller, self._layout, self._outputs)
 
     def _contacts(self, found: Any) -> Any:
         if self.results == "device":
             return device_results.contacts_of(found, self._outputs, self._layout)
         return result_of(Contacts, with_outputs(found, self._outputs), self._layout)
 
-    def _of_motion(self, query: str, vertices_t0: object, vertices_t1: object, stream: object = None) -> Any:
+    def _of_motion(
+        self, query: str, vertices_t0: object, vertices_t1: object, stream: object = None, *more: object
+    ) -> Any:
         on_device = device_arrays.is_on_device(vertices_t0)
         made_on = device_arrays.stream_number(stream)
         if device_arrays.is_on_device(vertices_t1) != on_device:
             raise TypeError("vertices_t0, vertices_t1: one is a device array, the other is not; give both in one place")
         if on_device:
-            return self._of_places(query, *self._places(vertices_t0, vertices_t1, made_on))
+            return self._of_places(query, *self._places(vertices_t0, vertices_t1, made_on), *more)
         start = arguments.vertices("vertices_t0", vertices_t0, self._shape, self._layout)
         end = arguments.vertices("vertices_t1", vertices_t1, self._shape, self._layout)
         if start.dtype != end.dtype:  # widening a float32 is exact
             start, end = arguments.widened(start), arguments.widened(end)
-        return getattr(self._core, query)(device_arrays.on_host(start, made_on), device_arrays.on_host(end, made_on))
+        ends = device_arrays.on_host(start, made_on), device_arrays.on_host(end, made_on)
+        return getattr(self._core, query)(*ends, *more)
 
     def _places(
         self, vertices_t0: object, vertices_t1: object, made_on: int | None
@@ -157,8 +218,8 @@ class MotionQueries(Generic[MotionResult, StepResult]):
             device_arrays.positions("vertices_t1", vertices_t1, self._shape, made_on),
         )
 
-    def _of_places(self, query: str, first: DevicePositions, second: DevicePositions) -> Any:
-        return getattr(self._core, query)(*self._for_core(first, second))
+    def _of_places(self, query: str, first: DevicePositions, second: DevicePositions, *more: object) -> Any:
+        return getattr(self._core, query)(*self._for_core(first, second), *more)
 
     def _for_core(self, first: DevicePositions, second: DevicePositions) -> tuple[CorePositions, CorePositions]:
         if first.is_double != second.is_double:

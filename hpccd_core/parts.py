@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from . import _core, arguments
-from .contacts import ROWS, Contacts
-from .results import result_of, with_outputs
+from .contacts import Contacts
+from .results import OUTPUT_ARRAYS, result_of, with_outputs
 
 # Name, dtype, shape of a row.
 _ARRAYS = (("vf", "uint32", (2,)), ("vf_toc", "float64", ()), ("ee", "uint32", (4,)), ("ee_toc", "float64", ()))
@@ -41,7 +41,7 @@ def contacts_of_step(results: Sequence[tuple[Contacts, int, int]]) -> Contacts:
     if not isinstance(results, Iterable):
         raise TypeError(f"results: expected a list of (contacts, part, parts), got {type(results).__name__}")
     checked = [_checked(f"results[{k}]", result) for k, result in enumerate(results)]
-    asked = {name: [name in contacts.outputs for contacts, _, _ in checked if len(contacts)] for name in ROWS}
+    asked = {name: [name in contacts.outputs for contacts, _, _ in checked if len(contacts)] for name in OUTPUT_ARRAYS}
     for name, those in asked.items():
         if any(those) and not all(those):
             raise ValueError(f"results: some have {name} and others do not; use detectors with the same outputs")
@@ -60,7 +60,9 @@ def hash_of(contacts: Contacts) -> int:
 
 def _for_core(contacts: Contacts) -> SimpleNamespace:
     """The contacts with all outputs as the core reads them: without rows where they were not computed."""
-    outputs = {name: contacts.outputs.get(name, np.empty((0, *row))) for name, row in ROWS.items()}
+    outputs = {
+        name: contacts.outputs.get(name, np.empty((0, *kind.row), kind.dtype)) for name, kind in OUTPUT_ARRAYS.items()
+    }
     arrays = {name: getattr(contacts, name) for name, _, _ in _ARRAYS}
     return SimpleNamespace(**arrays, **outputs, first_toc=contacts.first_toc, hash=contacts.hash)
 
@@ -80,7 +82,10 @@ def _contacts(name: str, contacts: object) -> Contacts:
     arrays: list[tuple[str, Any, str, tuple[int, ...]]] = [
         (field, getattr(contacts, field), dtype, row) for field, dtype, row in _ARRAYS
     ]
-    arrays += [(field, array, "float64", ROWS[field]) for field, array in contacts.outputs.items()]
+    arrays += [
+        (field, array, OUTPUT_ARRAYS[field].dtype, OUTPUT_ARRAYS[field].row)
+        for field, array in contacts.outputs.items()
+    ]
     for field, array, dtype, row in arrays:
         if not isinstance(array, np.ndarray) or array.dtype != dtype or array.shape[1:] != row or array.ndim == 0:
             raise TypeError(f"{name}: {field} is not an array as detectors return it; expected (n, *{row}) {dtype}")

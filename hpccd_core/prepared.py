@@ -32,6 +32,8 @@ class PreparedDetection:
     first_toc : DeviceArray, shape (1,), float64
     vf_offsets, ee_offsets, hashes, first_tocs : DeviceArray or None
         With worlds, as in :class:`DeviceContacts`.
+    points, normals, closest, vertices, weights, approach : DeviceArray
+        Outputs that the detector was asked for: of the vertex-face rows, then of the edge-edge rows.
     """
 
     vf: DeviceArray
@@ -51,12 +53,13 @@ class PreparedDetection:
         worlds: int | None,
         vertices: tuple[object, object],
         layout: MeshLayout | None = None,
+        outputs: tuple[str, ...] = (),
     ) -> None:
         if not isinstance(core, _core.PreparedDetection):
             raise TypeError("PreparedDetection: Detector.prepare() makes them")
         self._core = core
         self._n_worlds = worlds or 1
-        self._layout = layout
+        self._layout, self._outputs = layout, outputs
         self._vertices = vertices  # which are read in place
         for name, array in core.arrays(self._n_worlds).items():
             setattr(self, name, array)
@@ -82,7 +85,7 @@ class PreparedDetection:
     def contacts(self) -> DeviceContacts:
         """Wait for the device and return the last detection, in these arrays. RuntimeError if it is not complete."""
         found: Any = self._core.contacts(self._n_worlds)
-        contacts = device_results.contacts_of(found, (), self._layout)
+        contacts = device_results.contacts_of(found, self._outputs, self._layout)
         contacts.read_slices()  # now: another detection may follow
         return contacts
 

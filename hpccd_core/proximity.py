@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,7 @@ class Proximity(WithSides, PairsOfWorlds):
     hash : int
         64-bit; the same for the same pairs and distances on any backend and with any number of threads.
     outputs : dict of str to ndarray
-        The outputs that the detector was asked for; `closest` reads it.
+        The outputs that the detector was asked for; `normals`, `closest`, `vertices` and `weights` read it.
     """
 
     vf: Indices
@@ -43,7 +43,7 @@ class Proximity(WithSides, PairsOfWorlds):
     ee: Indices
     ee_distance: NDArray[np.float64]
     hash: int
-    outputs: dict[str, NDArray[np.float64]] = dataclasses.field(default_factory=dict)
+    outputs: dict[str, NDArray[Any]] = dataclasses.field(default_factory=dict)
     slices: Slices | None = dataclasses.field(default=None, repr=False)
     layout: MeshLayout | None = dataclasses.field(default=None, repr=False, compare=False)
 
@@ -56,6 +56,32 @@ class Proximity(WithSides, PairsOfWorlds):
         with outputs=("closest",).
         """
         return output(self.outputs, "closest")
+
+    @property
+    def normals(self) -> NDArray[np.float64]:
+        """(N+M, 3) float64, vertex-face first: unit vectors from face to vertex, or from edge a to edge b.
+
+        Zero where the distance is 0. Raises `OutputNotComputed` unless the detector was made with
+        outputs=("normals",).
+        """
+        return output(self.outputs, "normals")
+
+    @property
+    def vertices(self) -> Indices:
+        """(N+M, 4) uint32, vertex-face first: scene-wide vertices of each pair, v f0 f1 f2, or a0 a1 b0 b1.
+
+        Raises `OutputNotComputed` unless the detector was made with outputs=("weights",).
+        """
+        return output(self.outputs, "vertices")
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """(N+M, 4) float64, vertex-face first: the weights of `vertices`, as in Contacts, of the nearest points.
+
+        The derivative of the distance with respect to the position of vertex i of a row is weights[i] times the
+        normal. Raises `OutputNotComputed` unless the detector was made with outputs=("weights",).
+        """
+        return output(self.outputs, "weights")
 
     def world(self, k: int) -> Proximity:
         """The pairs of world k, 0 <= k < W, bit-identical to those of a detector of that world alone."""
@@ -145,6 +171,13 @@ class Gap(ComparedByRows):
         in order, vertex-face before edge-edge.
     points : ndarray, shape (2, 3), float64
         The nearest points of both sides, in the order of `features`; shape (0, 3) if there are none.
+    vertices : ndarray, shape (4,), uint32
+        Scene-wide vertices of the nearest pair, as in Proximity; shape (0,) if the meshes intersect or have none.
+    weights : ndarray, shape (4,), float64
+        Their weights, as in Proximity, or shape (0,).
+    normal : ndarray, shape (3,), float64
+        As a row of Proximity.normals, or shape (0,). The derivative of `distance` with respect to the position of
+        vertex i is weights[i] times the normal.
     """
 
     mesh_a: str
@@ -153,3 +186,6 @@ class Gap(ComparedByRows):
     kind: Kind
     features: tuple[int, ...]
     points: NDArray[np.float64]
+    vertices: Indices = dataclasses.field(default_factory=lambda: np.empty(0, np.uint32))
+    weights: NDArray[np.float64] = dataclasses.field(default_factory=lambda: np.empty(0))
+    normal: NDArray[np.float64] = dataclasses.field(default_factory=lambda: np.empty(0))

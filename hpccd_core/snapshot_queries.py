@@ -102,8 +102,8 @@ class SnapshotQueries(Generic[ProximityResult, IntersectionsResult, DistancesRes
             arguments.reject_unnamed("distances", _ONE_FRAME)
         names = self._layout.mesh_names
         gaps = [
-            Gap(names[a], names[b], distance, kind, tuple(features), points)
-            for a, b, distance, kind, features, points in self._ask("distances", vertices, stream)
+            Gap(names[a], names[b], distance, kind, tuple(features), *arrays)
+            for a, b, distance, kind, features, *arrays in self._ask("distances", vertices, stream)
         ]
         if self.worlds is None:
             return cast(DistancesResult, gaps)

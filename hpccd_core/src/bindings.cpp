@@ -72,6 +72,9 @@ py::dict to_dict(Contacts&& c) {
   d["points"] = hand_over<double>(std::move(c.points), 3);
   d["normals"] = hand_over<double>(std::move(c.normals), 3);
   d["closest"] = hand_over<double>(std::move(c.closest), 2, 3);
+  d["vertices"] = hand_over<std::uint32_t>(std::move(c.vertices), 4);
+  d["weights"] = hand_over<double>(std::move(c.weights), 4);
+  d["approach"] = hand_over<double>(std::move(c.approach));
   d["first_toc"] = c.first_toc;
   d["hash"] = c.hash;
   add_slices(d, std::move(c.slices), std::move(c.first_tocs));
@@ -85,6 +88,9 @@ py::dict to_dict(Proximity&& c) {
   d["ee"] = hand_over<std::uint32_t>(std::move(c.ee), 4);
   d["ee_distance"] = hand_over<double>(std::move(c.ee_distance));
   d["closest"] = hand_over<double>(std::move(c.closest), 2, 3);
+  d["normals"] = hand_over<double>(std::move(c.normals), 3);
+  d["vertices"] = hand_over<std::uint32_t>(std::move(c.vertices), 4);
+  d["weights"] = hand_over<double>(std::move(c.weights), 4);
   d["hash"] = c.hash;
   add_slices(d, std::move(c.slices));
   return d;
@@ -121,6 +127,8 @@ ContactsOfPart part_of(const py::handle& contacts, double part, double parts, st
   read("vf", of.vf, std::uint32_t{}), read("vf_toc", of.vf_toc, double{});
   read("ee", of.ee, std::uint32_t{}), read("ee_toc", of.ee_toc, double{});
   read("points", of.points, double{}), read("normals", of.normals, double{}), read("closest", of.closest, double{});
+  read("vertices", of.vertices, std::uint32_t{}), read("weights", of.weights, double{});
+  read("approach", of.approach, double{});
   of.part = part, of.parts = parts;
   return of;
 }
@@ -143,15 +151,20 @@ std::size_t n_features(GapKind kind) {
   return kind == GapKind::none ? 0 : kind == GapKind::vertex_face ? 2 : kind == GapKind::edge_edge ? 4 : 3;
 }
 
-// (mesh_a, mesh_b, distance, kind, features, points) of each gap.
+// (mesh_a, mesh_b, distance, kind, features, points, vertices, weights, normal) of each gap.
 py::list to_list(const std::vector<Gap>& gaps) {
   py::list l;
   for (const Gap& g : gaps) {
     const std::span<const std::uint32_t> features(g.features.data(), n_features(g.kind));
     py::array_t<double> points(std::vector<py::ssize_t>{g.kind == GapKind::none ? 0 : 2, 3});
     if (g.kind != GapKind::none) std::copy_n(g.points[0].data(), 6, points.mutable_data());
+    const bool apart = g.kind == GapKind::vertex_face || g.kind == GapKind::edge_edge;
+    const auto rows = [&](const auto& row) {
+      return py::array_t<typename std::decay_t<decltype(row)>::value_type>(apart ? row.size() : 0, row.data());
+    };
     l.append(py::make_tuple(g.mesh_a, g.mesh_b, g.distance, name_of(g.kind),
-                            std::vector<std::uint32_t>(features.begin(), features.end()), points));
+                            std::vector<std::uint32_t>(features.begin(), features.end()), points, rows(g.vertices),
+                            rows(g.weights), rows(g.normal)));
   }
   return l;
 }
@@ -169,8 +182,6 @@ py::dict in_place(const DeviceResults& r) {
   d["vf_toc"] = rows(r.values, r.n_vf);
   d["ee"] = rows(reinterpret_cast<const std::uint32_t*>(r.ee), r.n_ee, 4);
   d["ee_toc"] = rows(r.values + r.n_vf, r.n_ee);
-  for (const char* name : {"points", "normals"}) d[name] = py::array_t<double>(std::vector<py::ssize_t>{0, 3});
-  d["closest"] = py::array_t<double>(std::vector<py::ssize_t>{0, 2, 3});
   d["first_toc"] = r.first_toc;
   d["hash"] = r.hash;
   return d;
@@ -323,6 +334,7 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
       .def_readwrite("points", &Options::points)
       .def_readwrite("normals", &Options::normals)
       .def_readwrite("closest", &Options::closest)
+      .def_readwrite("weights", &Options::weights)
       .def_readwrite("minimum_separation", &Options::minimum_separation)
       .def_readwrite("method", &Options::method)
       .def_readwrite("restructure", &Options::restructure)
@@ -360,6 +372,19 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
             return hand_over<double>(unlocked([&] { return d.collision_free_steps(t0.positions, t1.positions); }));
           },
           "vertices_t0"_a, "vertices_t1"_a)
+      .def(
+          "collision_free_motion",
+          [](Detector& d, const GivenPositions& t0, const GivenPositions& t1, const Array<std::int64_t>& groups) {
+            const std::span<const std::int64_t> of_vertices(groups.data(), static_cast<std::size_t>(groups.size()));
+            CollisionFreeMotion m =
+                unlocked([&] { return d.collision_free_motion(t0.positions, t1.positions, of_vertices); });
+            const py::object vertices =
+                t0.positions.is_double ? py::object(hand_over<double>(std::move(m.vertices)))
+                                       : hand_over<float>(std::vector<float>(m.vertices.begin(), m.vertices.end()));
+            return py::make_tuple(vertices, hand_over<double>(std::move(m.factors)),
+                                  hand_over<std::uint32_t>(std::move(m.stuck)));
+          },
+          "vertices_t0"_a, "vertices_t1"_a, "groups"_a)
       .def(
           "proximity",
           [](Detector& d, const GivenPositions& vertices, double distance) {

@@ -272,13 +272,16 @@ py::dict to_dict(const DeviceResults& r, std::uint32_t n_worlds) {
   d["ef"] = array(r.ef, 'u', 4, {n_ef, 3});
   d["vf_values"] = array(r.values, 'f', 8, {n_vf});
   d["ee_values"] = array(r.values ? r.values + n_vf : nullptr, 'f', 8, {n_ee});
-  const auto places = [&](const void* p, std::vector<std::int64_t> row) {
+  const auto places = [&](const void* p, std::vector<std::int64_t> row, char kind = 'f', int item_bytes = 8) {
     row.insert(row.begin(), p ? n_vf + n_ee : 0);
-    return array(p, 'f', 8, std::move(row));
+    return array(p, kind, item_bytes, std::move(row));
   };
   d["points"] = places(r.points, {3});
   d["normals"] = places(r.normals, {3});
   d["closest"] = places(r.closest, {2, 3});
+  d["vertices"] = places(r.vertices, {4}, 'u', 4);
+  d["weights"] = places(r.weights, {4});
+  d["approach"] = places(r.approach, {});
   d["first_toc"] = r.first_toc;
   d["hash"] = r.hash;
   d["slices"] = py::none();
@@ -318,6 +321,14 @@ py::dict arrays_of(const PreparedDetection& d, std::uint32_t n_worlds) {
   a["ee_offsets"] = of_worlds(p.ee_offsets, 'i', worlds + 1);
   a["hashes"] = of_worlds(p.hashes, 'u', worlds);
   a["first_tocs"] = of_worlds(p.first_tocs, 'f', worlds);
+  const auto output = [&](const char* name, const void* data, std::vector<std::int64_t> row, char kind = 'f',
+                          int item_bytes = 8) {
+    if (!data) return;
+    row.insert(row.begin(), n_vf + n_ee);
+    a[name] = array(data, kind, item_bytes, std::move(row));
+  };
+  output("points", p.points, {3}), output("normals", p.normals, {3}), output("closest", p.closest, {2, 3});
+  output("vertices", p.vertices, {4}, 'u', 4), output("weights", p.weights, {4}), output("approach", p.approach, {});
   return a;
 }
 

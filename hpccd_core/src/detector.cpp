@@ -14,6 +14,7 @@
 #include "base/one_call.h"
 #include "base/standard_arithmetic.h"
 #include "checked.h"
+#include "contacts/outputs.h"
 #include "gpu/results_to_device.h"
 #include "prepared_impl.h"
 
@@ -130,7 +131,7 @@ struct Detector::Impl {
   // Whether results may be returned in the memory that a GPU has written.
   bool gives_in_place(Backend picked) const {
     const Options& o = options();
-    return picked == Backend::gpu && o.worlds == 1 && !o.points && !o.normals && !o.closest;
+    return picked == Backend::gpu && o.worlds == 1 && !Outputs::of_contacts(o).any();
   }
 
   Detection compute(Backend picked, Positions t0, Positions t1) {
@@ -269,11 +270,27 @@ std::vector<double> Detector::collision_free_steps(Positions t0, Positions t1) {
   return first;
 }
 
+CollisionFreeMotion Detector::collision_free_motion(Positions t0, Positions t1, std::span<const std::int64_t> groups) {
+  const StandardArithmetic arithmetic;
+  impl_->check(t0, t1);
+  const std::size_t n = impl_->common.features.n_vertices;
+  if (!groups.empty() && groups.size() != n)
+    throw InvalidArgument("groups: expected a number for each of the " + std::to_string(n) + " vertices, got " +
+                          std::to_string(groups.size()));
+  if (std::ranges::any_of(groups, [](std::int64_t group) { return group < -1; }))
+    throw InvalidArgument("groups: must be -1, for a vertex on its own, or a number from 0");
+  return impl_->ask(t0, t1, [&](DetectionBackend& backend, Positions a, Positions b, Counts&) {
+    return backend.free_motion(a, b, groups);
+  });
+}
+
 namespace {
 
 Proximity as_proximity(Contacts&& c) {
-  return {std::move(c.vf), std::move(c.vf_toc), std::move(c.ee), std::move(c.ee_toc), std::move(c.closest),
-          c.hash,          std::move(c.slices)};
+  return {std::move(c.vf),       std::move(c.vf_toc),  std::move(c.ee),
+          std::move(c.ee_toc),   std::move(c.closest), std::move(c.normals),
+          std::move(c.vertices), std::move(c.weights), c.hash,
+          std::move(c.slices)};
 }
 
 }  // namespace
@@ -311,11 +328,8 @@ DeviceResults Detector::proximity_on_device(Positions vertices, double distance)
 
 std::unique_ptr<PreparedDetection> Detector::prepare(Positions t0, Positions t1, double room) {
   const StandardArithmetic arithmetic;
-  const Options& o = options();
-  if (!o.results_on_device)
+  if (!options().results_on_device)
     throw InvalidArgument("results_on_device: this detector brings its results to the host; set the option");
-  if (o.points || o.normals || o.closest)
-    throw InvalidArgument("outputs: not offered by prepare(); use a detector without them, or detect()");
   if (!(room >= 1 && room <= 1000))
     throw InvalidArgument("room: how many times what this motion takes, 1 to 1000, got " + std::to_string(room));
   if (!t0.on_device || !t1.on_device)

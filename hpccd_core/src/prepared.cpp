@@ -47,6 +47,8 @@ DeviceResults PreparedDetection::contacts() const {
   r.vf = p.vf, r.ee = p.ee, r.values = p.tocs;
   r.hash = c.hash, r.first_toc = c.first_toc;
   r.vf_offsets = p.vf_offsets, r.ee_offsets = p.ee_offsets, r.hashes = p.hashes, r.first_tocs = p.first_tocs;
+  r.points = p.points, r.normals = p.normals, r.closest = p.closest;
+  r.vertices = p.vertices, r.weights = p.weights, r.approach = p.approach;
   return r;
 }
 

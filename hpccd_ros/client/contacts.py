@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 from hpccd.msg import ContactArray, PairSummary, PairSummaryArray
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
+from hpccd_core.results import OUTPUT_ARRAYS
 from hpccd_ros.client.names import belongs, check
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import Separation
@@ -18,7 +19,7 @@ from hpccd_ros.middleware.contact_messages import SceneContacts
 from hpccd_ros.middleware.result_fields import read_features
 
 
-def field(message: Any, name: str, dtype: type[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+def field(message: Any, name: str, dtype: DTypeLike, shape: tuple[int, ...]) -> NDArray[Any]:
     """A view of the field. Raises ValueError where it has another number of values."""
     flat = np.frombuffer(getattr(message, name), dtype)
     if flat.size != np.prod(shape):
@@ -38,8 +39,8 @@ def meshes_of(message: Any, name: str, count: int) -> NDArray[np.uint32]:
 class ContactArrays:
     """The N contacts of one message in canonical order; features are numbered within their mesh.
 
-    All arrays are views of the message. `points`, `normals` and `closest` are (0, 3) and (0, 2, 3) if the node does not
-    send them (its parameter ``outputs``).
+    All arrays are views of the message. Outputs from `points` to `approach` have no rows if the node does not send them
+    (its parameter ``outputs``; "weights" stands for the last three).
 
     Attributes
     ----------
@@ -61,6 +62,12 @@ class ContactArrays:
         Unit vectors from the face to the vertex, or from edge a to edge b; zero if no side is defined.
     closest : ndarray, shape (N, 2, 3), float64
         Nearest points of both sides at their time of impact, in the unit of the scene.
+    vertices : ndarray, shape (N, 4), uint32
+        v of `mesh_a` and f0 f1 f2 of `mesh_b`, or a0 a1 of `mesh_a` and b0 b1 of `mesh_b`.
+    weights : ndarray, shape (N, 4), float64
+        Weights of `vertices`, as in ``hpccd_core.Contacts``.
+    approach : ndarray, shape (N,), float64
+        How fast the gap grows at the time of impact, as in ``hpccd_core.Contacts``.
     distance : ndarray, shape (N,), float64
         Distance of the sides, in the unit of the scene, in responses to the query ``proximity``; otherwise (0,).
     minimum_separation : float
@@ -87,6 +94,9 @@ class ContactArrays:
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
     closest: NDArray[np.float64]
+    vertices: NDArray[np.uint32]
+    weights: NDArray[np.float64]
+    approach: NDArray[np.float64]
     distance: NDArray[np.float64]
     minimum_separation: float
     pair_separation: dict[tuple[str, str], float]
@@ -98,8 +108,8 @@ class ContactArrays:
         return len(self.mesh_a)
 
 
-# Fields that may be empty, and the shape of what they hold for each contact.
-_OPTIONAL: dict[str, tuple[int, ...]] = {"points": (3,), "normals": (3,), "closest": (2, 3), "distance": ()}
+# Fields that may be empty; shape of what they hold for each contact, and type.
+_OPTIONAL = {name: (array.row, array.dtype) for name, array in OUTPUT_ARRAYS.items()} | {"distance": ((), "float64")}
 
 
 def contacts_from_message(message: ContactArray) -> ContactArrays:
@@ -127,8 +137,8 @@ def contacts_from_message(message: ContactArray) -> ContactArrays:
     separation = _separation_of(message)
     order = {name: number for number, name in enumerate(message.mesh_names)}
     optional = {
-        name: field(message, name, np.float64, (count if len(getattr(message, name)) else 0, *shape))
-        for name, shape in _OPTIONAL.items()
+        name: field(message, name, dtype, (count if len(getattr(message, name)) else 0, *row))
+        for name, (row, dtype) in _OPTIONAL.items()
     }
     return ContactArrays(
         tuple(message.mesh_names),
@@ -169,7 +179,8 @@ def scene_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
     Returns
     -------
     SceneContacts
-        ``vf`` (N, 2), ``vf_toc`` (N,), ``ee`` (M, 4), ``ee_toc`` (M,), ``points``, ``normals`` and ``closest``.
+        ``vf`` (N, 2), ``vf_toc`` (N,), ``ee`` (M, 4), ``ee_toc`` (M,), ``points``, ``normals``, ``closest``,
+        ``vertices``, ``weights`` and ``approach``.
         Responses to ``proximity`` have ``vf_distance`` and ``ee_distance`` instead of times, those to
         ``intersections`` only ``ef`` (K, 3).
 

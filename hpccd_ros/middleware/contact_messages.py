@@ -3,12 +3,15 @@
 
 from array import array
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from hpccd.msg import ContactArray
 from numpy.typing import NDArray
 
 from hpccd_core.mesh_layout import Sides
+from hpccd_core.options import OUTPUTS
+from hpccd_core.results import OUTPUT_ARRAYS
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.middleware.fields import to_field, zeros
 
@@ -53,6 +56,20 @@ def fill_pairs(message: ContactArray, pairs: FeaturePairs, layout: Layout) -> No
     message.features_a, message.features_b = features_a, features_b
 
 
+def fill_outputs(message: ContactArray, sent: dict[str, NDArray[Any]], layout: Layout) -> None:
+    """Write arrays of outputs, of the pairs that `fill_pairs` has written."""
+    for name, values in sent.items():
+        within = (values - _first_vertices(message, layout)).astype(np.uint32) if name == "vertices" else values
+        setattr(message, name, to_field(within))
+
+
+def _first_vertices(message: ContactArray, layout: Layout) -> NDArray[np.int64]:
+    """(N, 4): scene-wide number of the first vertex of the mesh of each entry in ``vertices``."""
+    of_a, of_b = (layout.vertex_offsets[np.frombuffer(m, np.uint32)] for m in (message.mesh_a, message.mesh_b))
+    second = np.where(np.frombuffer(message.kind, np.uint8) == ContactArray.VERTEX_FACE, of_b, of_a)
+    return np.stack([of_a, second, of_b, of_b], 1)
+
+
 def read_pairs(message: ContactArray, layout: Layout) -> FeaturePairs:
     """The inverse of `fill_pairs`, of a message whose arrays fit together."""
     kind = np.frombuffer(message.kind, np.uint8)
@@ -79,19 +96,18 @@ def fill_contacts(
     layout: Layout,
     *,
     max_contacts: int = 0,
-    outputs: tuple[str, ...] = ("points", "normals", "closest"),
+    outputs: tuple[str, ...] = OUTPUTS,
 ) -> None:
     """Write the core's ``Contacts`` into ``message`` (all but header, start, step, accuracy, backend, drops and the
     separation).
 
     max_contacts: 0: all; else only that many of the earliest, still in canonical order (of equal times those
     first in it); ``total``, ``first_toc`` and ``hash`` are of all contacts found.
-    outputs: which of points, normals and closest to send, where the core has computed them.
+    outputs: which outputs to send, where the core has computed them.
     """
     pairs, vf_toc, ee_toc = FeaturePairs.of(contacts.vf, contacts.ee), contacts.vf_toc, contacts.ee_toc
     total = len(pairs)
-    computed = {name: getattr(contacts, name, None) for name in outputs}
-    sent = {name: values for name, values in computed.items() if values is not None and len(values) == total}
+    sent = outputs_of(contacts, outputs, total)
     truncated = 0 < max_contacts < total
     if truncated:
         keep = lowest(np.concatenate([vf_toc, ee_toc]), max_contacts)
@@ -104,10 +120,15 @@ def fill_contacts(
     np.concatenate([vf_toc, ee_toc], out=np.frombuffer(toc))
     message.toc = toc
     fill_names(message, layout)
-    for name, values in sent.items():
-        setattr(message, name, to_field(values))
+    fill_outputs(message, sent, layout)
     message.first_toc = float(contacts.first_toc)
     message.total, message.truncated, message.hash = total, truncated, int(contacts.hash)
+
+
+def outputs_of(found: Any, outputs: tuple[str, ...], total: int) -> dict[str, NDArray[Any]]:
+    """The arrays of the core's result that these words ask for, as far as it has them."""
+    arrays = {name: getattr(found, name, None) for name, array in OUTPUT_ARRAYS.items() if array.asked in outputs}
+    return {name: values for name, values in arrays.items() if values is not None and len(values) == total}
 
 
 def fill_names(message, layout: Layout) -> None:
@@ -137,9 +158,17 @@ class SceneContacts:
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
     closest: NDArray[np.float64]
+    vertices: NDArray[np.uint32]
+    weights: NDArray[np.float64]
+    approach: NDArray[np.float64]
     vf_distance: NDArray[np.float64]
     ee_distance: NDArray[np.float64]
     ef: NDArray[np.uint32]
+
+
+def _scene_wide_vertices(message: ContactArray, layout: Layout) -> NDArray[np.uint32]:
+    vertices = np.frombuffer(message.vertices, np.uint32).reshape(-1, 4)
+    return vertices if not len(vertices) else (vertices + _first_vertices(message, layout)).astype(np.uint32)
 
 
 def other_topologies(message: ContactArray, layout: Layout) -> str | None:
@@ -169,6 +198,9 @@ def read_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
         np.frombuffer(message.points, np.float64).reshape(-1, 3),
         np.frombuffer(message.normals, np.float64).reshape(-1, 3),
         np.frombuffer(message.closest, np.float64).reshape(-1, 2, 3),
+        _scene_wide_vertices(message, layout),
+        np.frombuffer(message.weights, np.float64).reshape(-1, 4),
+        np.frombuffer(message.approach, np.float64),
         distance[:n_vf],
         distance[n_vf:],
         pairs.ef,

@@ -10,7 +10,14 @@ from hpccd.msg import ContactArray, DistanceArray
 import hpccd_core as hc
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.pair_summary import approach_speeds, directions
-from hpccd_ros.middleware.contact_messages import FeaturePairs, fill_names, fill_pairs, lowest
+from hpccd_ros.middleware.contact_messages import (
+    FeaturePairs,
+    fill_names,
+    fill_outputs,
+    fill_pairs,
+    lowest,
+    outputs_of,
+)
 from hpccd_ros.middleware.fields import to_field
 
 KINDS = {
@@ -24,14 +31,13 @@ def fill_proximity(
     message: ContactArray, near: hc.Proximity, layout: Layout, *, max_contacts: int, outputs: tuple[str, ...]
 ) -> None:
     """Write all but header, start, step, accuracy and backend. max_contacts: 0: all; else this many of the nearest, in
-    canonical order. outputs: whether to send closest, where the core has computed it."""
+    canonical order. outputs: which outputs to send, where the core has computed them."""
     pairs, distance = FeaturePairs.of(near.vf, near.ee), np.concatenate([near.vf_distance, near.ee_distance])
-    closest = near.outputs.get("closest") if "closest" in outputs else None
     keep = lowest(distance, max_contacts) if 0 < max_contacts < len(pairs) else None
     _fill(message, pairs, layout, near.hash, keep)
     message.distance = to_field(distance if keep is None else distance[keep])
-    if closest is not None:
-        message.closest = to_field(closest if keep is None else closest[keep])
+    sent = outputs_of(near, outputs, len(pairs))
+    fill_outputs(message, sent if keep is None else {name: rows[keep] for name, rows in sent.items()}, layout)
 
 
 def fill_intersections(message: ContactArray, hits: hc.Intersections, layout: Layout, *, max_contacts: int) -> None:

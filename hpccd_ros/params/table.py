@@ -126,7 +126,8 @@ DETECTION_ROWS = (
         "outputs",
         "string[]",
         [],
-        "Additional arrays of each contact: contact points, normals, nearest points of both sides",
+        "Additional arrays of each contact: contact points, normals, nearest points of both sides, weights of the "
+        "vertices with their approach",
         choices=OUTPUTS,
         change=ALWAYS,
         example=["points"],

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The first difference between a recorded result of the node and the contacts computed again, in words."""
 
+import math
+
 import numpy as np
 
 from hpccd_core.options import ACCURACIES
+from hpccd_core.results import OUTPUT_ARRAYS
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NO_BOUNDS, MotionBounds
 from hpccd_ros.middleware import contact_messages
@@ -16,8 +19,8 @@ def difference(
     """None if `recorded` (ContactArray) is the message that the node would send for `contacts` (of the core) and
     `bounds`.
 
-    Pairs, times, their order, totals, first time and hash must be bit-identical. Points, normals and nearest points are
-    derived from these and not compared. any_one: the node stopped at the first contact found (report "any"), which
+    Pairs, times, their order, totals, first time and hash must be bit-identical. Outputs (points and so on) are derived
+    from these and not compared. any_one: the node stopped at the first contact found (report "any"), which
     depends on the timing of its threads: there must be one if there is any, and it must be one of all `contacts`.
     """
     total = len(contacts.vf) + len(contacts.ee)
@@ -76,7 +79,7 @@ def _malformed(message, layout) -> str | None:
         return f"its accuracy is {message.accuracy[:20]!r}, none of {', '.join(ACCURACIES)}"
     if list(message.mesh_names) != list(layout.mesh_names):
         return f"its meshes are {list(message.mesh_names)}, those of the recording {list(layout.mesh_names)}"
-    for name, per_contact in (("points", 3), ("normals", 3), ("closest", 6)):
+    for name, per_contact in {name: math.prod(array.row) for name, array in OUTPUT_ARRAYS.items()}.items():
         if len(getattr(message, name)) not in (0, per_contact * count):
             return f"{name} has {len(getattr(message, name))} coordinates for {count} contacts"
     if len(message.distance):

@@ -58,6 +58,13 @@ class HPCCD_API Detector {
   /// The same for each world.
   std::vector<double> collision_free_steps(Positions vertices_t0, Positions vertices_t1);
 
+  /// A motion without contacts, in which each vertex keeps its own part of the given motion; whatever Options::report
+  /// is. No part is less than 0.9 times collision_free_step, unless no such position exists after rounding. groups: by
+  /// vertex of one world, -1 or a number >= 0; vertices with the same number share a factor. Empty: none do. Throws
+  /// InvalidArgument for groups of another length or below -1.
+  CollisionFreeMotion collision_free_motion(Positions vertices_t0, Positions vertices_t1,
+                                            std::span<const std::int64_t> groups = {});
+
   /// Vertex-face and edge-edge pairs within a Euclidean distance, in units of the coordinates. Throws InvalidArgument
   /// unless distance is finite and >= 0.
   Proximity proximity(Positions vertices, double distance);

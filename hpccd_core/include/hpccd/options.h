@@ -42,6 +42,7 @@ struct Options {
   bool points = false;   ///< where the features meet
   bool normals = false;  ///< unit normals
   bool closest = false;  ///< the nearest points of both sides
+  bool weights = false;  ///< vertices, weights and approach: what a solver needs beside normals
   /// Pairs that come within this Euclidean distance of each other are contacts. In units of the coordinates, finite,
   /// >= 0. 0: pairs that touch.
   double minimum_separation = 0;

@@ -44,6 +44,13 @@ struct PreparedResults {
   const std::uint64_t* ee_offsets = nullptr;  ///< as vf_offsets
   const std::uint64_t* hashes = nullptr;      ///< as vf_offsets
   const double* first_tocs = nullptr;         ///< for several worlds, otherwise null; as in DeviceResults
+  /// Outputs of the vertex-face rows, then of the edge-edge rows; null unless requested, as in DeviceResults.
+  const std::array<double, 3>* points = nullptr;
+  const std::array<double, 3>* normals = nullptr;                 ///< as points
+  const std::array<std::array<double, 3>, 2>* closest = nullptr;  ///< as points
+  const std::array<std::uint32_t, 4>* vertices = nullptr;         ///< as points
+  const std::array<double, 4>* weights = nullptr;                 ///< as points
+  const double* approach = nullptr;                               ///< as points
 };
 
 /// A detection on fixed device arrays, created by Detector::prepare with the options and separations of that time. It

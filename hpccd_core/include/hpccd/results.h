@@ -39,7 +39,17 @@ struct Contacts {
   /// or if the features are degenerate or parallel at toc. With a minimum separation, it is the direction from face to
   /// vertex or from edge a to b.
   std::vector<std::array<double, 3>> normals;
-  std::vector<std::array<std::array<double, 3>, 2>> closest;   ///< nearest points of both sides at toc
+  std::vector<std::array<std::array<double, 3>, 2>> closest;  ///< nearest points of both sides at toc
+  /// The four vertices of each pair, vf rows first: v f0 f1 f2, or a0 a1 b0 b1; empty unless weights are requested.
+  std::vector<std::array<std::uint32_t, 4>> vertices;
+  /// Weights of these vertices at toc: 1 -l0 -l1 -l2 with the barycentric coordinates of the point on the face, or -(1
+  /// - s) -s 1 - u u with the positions s and u on edges a and b. Their weighted sum is the vector from the point on
+  /// the face to the vertex, or from edge a to edge b: zero in plain contact, the gap with a minimum separation.
+  std::vector<std::array<double, 4>> weights;
+  /// Derivative of the gap with respect to time at toc: normal times the weighted sum of the vertices' motions.
+  /// Negative while the features approach each other; 0 where they only graze each other, within rounding errors of the
+  /// motion, or where the normal is zero.
+  std::vector<double> approach;
   double first_toc = std::numeric_limits<double>::infinity();  ///< infinite without contacts
   /// Hash of features and times: the same for the same contacts on every backend and for any number of threads. For
   /// several worlds, the sum over worlds k of their hashes times 2 k + 1.
@@ -49,6 +59,16 @@ struct Contacts {
   std::vector<double> first_tocs;  ///< of each world; empty for one world
 };
 
+/// A motion without contacts, made of a given one by shortening the motion of each vertex. For several worlds, rows of
+/// world 0 come first.
+struct CollisionFreeMotion {
+  /// x y z of each vertex at its end. Numbers of the type that the positions had: the straight motion to exactly these
+  /// has no contact, except between features that are in contact at t = 0.
+  std::vector<double> vertices;
+  std::vector<double> factors;       ///< by vertex, the part of its own motion that it keeps, in [0, 1]
+  std::vector<std::uint32_t> stuck;  ///< vertices of pairs in contact at t = 0, whose factor is 0, sorted
+};
+
 /// Pairs of features within a distance of each other in one frame, in the order of Contacts.
 struct Proximity {
   std::vector<std::array<std::uint32_t, 2>> vf;               ///< vertex, face
@@ -56,8 +76,13 @@ struct Proximity {
   std::vector<std::array<std::uint32_t, 4>> ee;               ///< the vertices of both edges
   std::vector<double> ee_distance;                            ///< Euclidean distance
   std::vector<std::array<std::array<double, 3>, 2>> closest;  ///< vf rows first; empty unless requested
-  std::uint64_t hash = 0;                                     ///< hash of features and distances, as in Contacts
-  WorldSlices slices;                                         ///< for several worlds, as in Contacts
+  /// Unit vectors from the point on the face to the vertex, or from edge a to edge b; zero at distance 0. Empty unless
+  /// requested.
+  std::vector<std::array<double, 3>> normals;
+  std::vector<std::array<std::uint32_t, 4>> vertices;  ///< as in Contacts
+  std::vector<std::array<double, 4>> weights;          ///< as in Contacts, of the nearest points
+  std::uint64_t hash = 0;                              ///< hash of features and distances, as in Contacts
+  WorldSlices slices;                                  ///< for several worlds, as in Contacts
 };
 
 /// Edges that intersect or touch faces in one frame, in lexicographic order.
@@ -77,6 +102,11 @@ struct Gap {
   GapKind kind = GapKind::none;                               ///< kind of the closest pair of features
   std::array<std::uint32_t, 4> features{};                    ///< as in vf, ee or ef, then zeros
   std::array<std::array<double, 3>, 2> points{};              ///< the nearest points of both meshes
+  /// As in Proximity, of the closest pair; zero for edge_face and none. The derivative of the distance with respect to
+  /// the position of vertices[i] is weights[i] times the normal.
+  std::array<std::uint32_t, 4> vertices{};
+  std::array<double, 4> weights{};  ///< see vertices
+  std::array<double, 3> normal{};   ///< zero at distance 0; see vertices
 };
 
 /// Results in a GPU's memory, complete when the call returns. Rows and order are those of Contacts, Proximity and
@@ -95,8 +125,11 @@ struct DeviceResults {
   const std::array<double, 3>* points = nullptr;                  ///< n_vf + n_ee rows; null unless requested
   const std::array<double, 3>* normals = nullptr;                 ///< n_vf + n_ee rows; null unless requested
   const std::array<std::array<double, 3>, 2>* closest = nullptr;  ///< n_vf + n_ee rows; null unless requested
-  double first_toc = std::numeric_limits<double>::infinity();     ///< infinite without contacts
-  std::uint64_t hash = 0;                                         ///< as in Contacts
+  const std::array<std::uint32_t, 4>* vertices = nullptr;         ///< n_vf + n_ee rows; null unless requested
+  const std::array<double, 4>* weights = nullptr;                 ///< n_vf + n_ee rows; null unless requested
+  const double* approach = nullptr;                            ///< n_vf + n_ee rows, of contacts; null unless requested
+  double first_toc = std::numeric_limits<double>::infinity();  ///< infinite without contacts
+  std::uint64_t hash = 0;                                      ///< as in Contacts
   const std::uint64_t* vf_offsets = nullptr;  ///< for several worlds, otherwise null; as in WorldSlices
   const std::uint64_t* ee_offsets = nullptr;  ///< as vf_offsets
   const std::uint64_t* ef_offsets = nullptr;  ///< as vf_offsets

@@ -6,6 +6,7 @@
 
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,11 @@ class DetectionBackend {
   // By world: the earliest time of a contact, never late if the tier promises that; infinity without contacts. Also
   // nothing if the backend leaves the query to the CPU.
   virtual std::optional<std::vector<double>> earliest(Positions, Positions) { return std::nullopt; }
+
+  // The ends of a shortened motion. Also nothing if the backend leaves the query to the CPU.
+  virtual std::optional<CollisionFreeMotion> free_motion(Positions, Positions, std::span<const std::int64_t>) {
+    return std::nullopt;
+  }
 
   // For one snapshot. Also nothing if the backend leaves the query to the CPU.
   virtual std::optional<Contacts> proximity(Positions, double) { return std::nullopt; }  // distances instead of times

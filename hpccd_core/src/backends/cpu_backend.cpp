@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "contacts/gaps.h"
@@ -128,14 +129,16 @@ void CpuBackend::update(Positions t0, Positions t1, Tests tests) {
   }
 }
 
-void CpuBackend::begin_motion(Positions t0, Positions t1, Tests tests) {
+void CpuBackend::begin_motion(Positions t0, Positions t1, Tests tests) { begin_motion(t0, t1, tests, shared_.tree); }
+
+void CpuBackend::begin_motion(Positions t0, Positions t1, Tests tests, MovingTree& tree) {
   const Options& o = shared_.options;
-  shared_.tree.bound(t0, t1, shared_.separations.largest());
+  tree.bound(t0, t1, shared_.separations.largest());
   shared_.profiler.mark("bounds");
-  const MotionBounds& motion = shared_.tree.motion();
+  const MotionBounds& motion = tree.motion();
   const bool rounds = floats_suffice(motion.short_edge, motion.map.scale), here = tests == Tests::all_here;
-  search_.emplace(shared_.tree.tree(), shared_.rules, o.simd, here && rounds);
-  begin(*search_);
+  search_.emplace(tree.tree(), shared_.rules, o.simd, here && rounds);
+  begin(*search_, motion);
   search_->geometry.separations = shared_.separations_now();
   search_->geometry.margin = {shared_.separations.most() + motion.rounding, motion.map.scale};
   search_->geometry.rounded = rounds ? motion.rounded.data() : nullptr;
@@ -146,8 +149,9 @@ void CpuBackend::begin_motion(Positions t0, Positions t1, Tests tests) {
   counts_.earliest = search_->report == Report::first, counts_.timed = walks_tree();
 }
 
-void CpuBackend::begin(Search& search) const {
-  const MotionBounds& motion = shared_.tree.motion();
+void CpuBackend::begin(Search& search) const { begin(search, shared_.tree.motion()); }
+
+void CpuBackend::begin(Search& search, const MotionBounds& motion) const {
   search.geometry = {motion.vertices.data(), shared_.features.edges.data(), shared_.features.faces.data(),
                      motion.kdops.data()};
   search.cancellation = &shared_.cancellation;
@@ -191,10 +195,7 @@ void CpuBackend::test_each(const std::vector<LeafPair>& pairs, Test&& test) {
   for (Worker& w : workers_) w.flush();
 }
 
-Contacts CpuBackend::collect() {
-  const Options& o = shared_.options;
-  return collect(*search_, {o.points, o.normals, o.closest, AtTime::contact});
-}
+Contacts CpuBackend::collect() { return collect(*search_, Outputs::of_contacts(shared_.options)); }
 
 Contacts CpuBackend::collect(const Search& search, Outputs outputs) {
   // Distributing the work (five jobs) takes as long as this amount of work.
@@ -248,7 +249,7 @@ std::optional<Contacts> CpuBackend::proximity(Positions vertices, double distanc
   begin_proximity(vertices, distance, search);
   counts_.asked[0] = counts_.asked[1] = true;
   walk_tree(search);
-  return collect(search, {false, false, shared_.options.closest, AtTime::start});
+  return collect(search, Outputs::of_proximity(shared_.options));
 }
 
 std::optional<Intersections> CpuBackend::intersections(Positions vertices) {
@@ -299,6 +300,95 @@ std::optional<std::vector<double>> CpuBackend::earliest(Positions t0, Positions 
   find_earliest(t0, t1, true);
   shared_.cancellation.heed();
   return std::vector<double>{search_->earliest};
+}
+
+// The features of a motion that is shortened stay within boxes of their whole way: later rounds only test the
+// candidates of one search by such boxes again, as far as their vertices have changed. A search of the rounded numbers
+// from the start is the proof.
+
+std::optional<CollisionFreeMotion> CpuBackend::free_motion(Positions t0, Positions t1,
+                                                           std::span<const std::int64_t> groups) {
+  Shortening motion(t0, t1, groups);
+  if (!whole_) whole_ = std::make_unique<MovingTree>(*shared_.scene, shared_.features, shared_.pool, true);
+  for (;;) {
+    begin_motion(t0, motion.end(), Tests::all_here);
+    search_->report = Report::all, counts_.earliest = false;
+    shared_.tree.fit(shared_.profiler);
+    walk_tree(*search_);
+    if (motion.shorten(touching()).empty()) break;
+    shorten_to_rest(t0, motion);
+  }
+  shared_.cancellation.heed();
+  return std::move(motion).result();
+}
+
+// Until no candidate touches.
+void CpuBackend::shorten_to_rest(Positions t0, Shortening& motion) {
+  const std::vector<PairGroup> candidates = search_whole_way(t0, motion.end());
+  ChangedFeatures changed(shared_.features);
+  for (;;) {
+    const std::span<const std::uint32_t> vertices = motion.shorten(touching());
+    if (vertices.empty()) return;
+    whole_->shorten(t0, motion.end(), vertices);
+    shared_.profiler.mark("bounds");
+    changed.set(vertices, shared_.pool);
+    test_changed(candidates, changed);
+    mark_traversal();
+  }
+}
+
+// Leaves all contacts in the workers, and returns the candidates.
+std::vector<PairGroup> CpuBackend::search_whole_way(Positions t0, Positions t1) {
+  begin_motion(t0, t1, Tests::all_here, *whole_);
+  search_->report = Report::all, counts_.earliest = false;
+  whole_->fit(shared_.profiler);
+  std::vector<std::vector<PairGroup>> kept(workers_.size());
+  struct Release {
+    std::vector<Worker>& workers;
+    ~Release() {
+      for (Worker& w : workers) w.kept = nullptr;
+    }
+  } release{workers_};
+  for (std::size_t i = 0; i < workers_.size(); ++i) workers_[i].kept = &kept[i];
+  walk_tree(*search_);
+  std::vector<PairGroup> all;
+  for (auto& of_worker : kept) std::ranges::move(of_worker, std::back_inserter(all));
+  return all;
+}
+
+// Leaves the contacts in the workers.
+void CpuBackend::test_changed(const std::vector<PairGroup>& candidates, const ChangedFeatures& changed) {
+  for (Worker& w : workers_) w.begin(*search_);
+  for (const PairGroup& group : candidates) {
+    const auto& [of_first, of_second] = changed.of(group.kind);
+    parallel_for(
+        shared_.pool, group.first.size(), 4 * batch_capacity, [&](std::size_t begin, std::size_t end, int thread) {
+          std::uint32_t first[batch_capacity], second[batch_capacity], n = 0;
+          const auto test = [&] {
+            workers_[static_cast<std::size_t>(thread)].test_pairs({first, n}, {second, n}, group.kind, group.rule);
+            n = 0;
+          };
+          for (std::size_t i = begin; i < end; ++i) {
+            first[n] = group.first[i], second[n] = group.second[i];
+            n += of_first[first[n]] | of_second[second[n]];
+            if (n == batch_capacity) test();
+          }
+          test();
+        });
+  }
+}
+
+std::span<const Shortening::Touching> CpuBackend::touching() {
+  touching_.clear();
+  for (const Worker& w : workers_)
+    for (const auto& [list, kind] :
+         {std::pair(&w.vertex_face, Kind::vertex_face), std::pair(&w.edge_edge, Kind::edge_edge)})
+      for (const Contact& c : *list) {
+        Shortening::Touching& pair = touching_.emplace_back();
+        pair_vertices(search_->geometry, kind, c.first, c.second, pair.vertices);
+        pair.toc = c.toc;
+      }
+  return touching_;
 }
 
 // Leaves the contacts in the workers.

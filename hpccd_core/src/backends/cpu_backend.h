@@ -8,6 +8,7 @@
 #include "backends/backend.h"
 #include "backends/near_list.h"
 #include "backends/resources.h"
+#include "backends/shortening.h"
 #include "backends/work_counts.h"
 #include "backends/world_memory.h"
 #include "contacts/canonical.h"
@@ -25,6 +26,8 @@ class CpuBackend final : public DetectionBackend {
 
   // By the default traversal, whatever the method is.
   std::optional<std::vector<double>> earliest(Positions t0, Positions t1) override;
+  std::optional<CollisionFreeMotion> free_motion(Positions t0, Positions t1,
+                                                 std::span<const std::int64_t> groups) override;
   std::optional<Contacts> proximity(Positions vertices, double distance) override;
   std::optional<Intersections> intersections(Positions vertices) override;
   std::optional<std::vector<Gap>> distances(Positions vertices) override;
@@ -50,6 +53,7 @@ class CpuBackend final : public DetectionBackend {
 
  private:
   void begin(Search& search) const;
+  void begin(Search& search, const MotionBounds& motion) const;
   void find_earliest(Positions t0, Positions t1, bool time_only);
   void begin_earliest(Positions t0, Positions t1, bool time_only);
   bool answer_from_near_pairs();
@@ -61,7 +65,12 @@ class CpuBackend final : public DetectionBackend {
   void update_drift();
   std::optional<std::vector<LeafPair>> open_pairs();
   void remember_earliest();
+  void shorten_to_rest(Positions t0, Shortening& motion);
+  std::vector<PairGroup> search_whole_way(Positions t0, Positions t1);
+  void test_changed(const std::vector<PairGroup>& candidates, const ChangedFeatures& changed);
+  std::span<const Shortening::Touching> touching();
   void begin_motion(Positions t0, Positions t1, Tests tests);
+  void begin_motion(Positions t0, Positions t1, Tests tests, MovingTree& tree);
   void begin_proximity(Positions vertices, double distance, ProximitySearch& search);
   void fit_snapshot(Positions vertices, double distance = 0);
   void walk_tree(Search& search);
@@ -79,9 +88,12 @@ class CpuBackend final : public DetectionBackend {
   std::optional<ContactSearch> search_;  // of the last motion
   WorkCounts counts_;                    // counts of the last query, without its numbers
   ContactOrder order_;
-  NearList near_;                        // for the earliest contacts of motions that begin alike
-  Drift drift_;                          // of the snapshot of the list
-  Travel travel_;                        // of the motion, relative to the list
+  NearList near_;  // for the earliest contacts of motions that begin alike
+  Drift drift_;    // of the snapshot of the list
+  Travel travel_;  // of the motion, relative to the list
+  std::unique_ptr<MovingTree>
+      whole_;  // by boxes of the whole way, for motions that are shortened; created by the first
+  std::vector<Shortening::Touching> touching_;
   std::optional<MeshPairs> mesh_pairs_;  // created by the first search for smallest distances
   // The start of the drift: the numbers of that snapshot and of the tree.
   std::optional<std::pair<std::uint64_t, std::uint64_t>> drift_of_;

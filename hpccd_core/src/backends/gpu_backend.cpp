@@ -29,8 +29,6 @@ bool stays_apart(const UndecidedPair& pair, double until) {
                                       : apart_until<Kind::vertex_face>(pair.t0, pair.t1, until, pair.separation);
 }
 
-bool any(Outputs outputs) { return outputs.points || outputs.normals || outputs.closest; }
-
 }  // namespace
 
 std::string GpuBackend::unsupported(const Options& options) {
@@ -92,17 +90,14 @@ std::optional<DeviceResults> GpuBackend::detect_on_device(Positions t0, Position
   require_rest(t0, t1);
   return attempt([&] {
     run_contacts(t0, t1);
-    const Options& o = shared_.options;
-    return with_places(finish_on_device(), {o.points, o.normals, o.closest, AtTime::contact}, shared_.separations_now(),
-                       t0, t1);
+    return with_places(finish_on_device(), Outputs::of_contacts(shared_.options), shared_.separations_now(), t0, t1);
   });
 }
 
 std::optional<DeviceResults> GpuBackend::proximity_on_device(Positions vertices, double distance) {
   return attempt([&] {
     run_near_pairs(vertices, distance);
-    return with_places(finish_on_device(), {false, false, shared_.options.closest, AtTime::start}, {distance}, vertices,
-                       vertices);
+    return with_places(finish_on_device(), Outputs::of_proximity(shared_.options), {distance}, vertices, vertices);
   });
 }
 
@@ -179,11 +174,10 @@ void GpuBackend::run_contacts(Positions t0, Positions t1) {
 }
 
 Contacts GpuBackend::contacts(Positions t0, Positions t1) {
-  const Options& o = shared_.options;
   run_contacts(t0, t1);
-  Contacts found = finish_on_host(o.report);
+  Contacts found = finish_on_host(shared_.options.report);
   if (last_boxes_.until_best) pipeline_->choose_hints(found.first_toc);
-  add_places(found, {o.points, o.normals, o.closest, AtTime::contact}, shared_.separations_now(), t0, t1);
+  add_places(found, Outputs::of_contacts(shared_.options), shared_.separations_now(), t0, t1);
   shared_.profiler.mark("contacts");
   return found;
 }
@@ -202,7 +196,7 @@ void GpuBackend::run_near_pairs(Positions vertices, double distance) {
 Contacts GpuBackend::near_pairs(Positions vertices, double distance) {
   run_near_pairs(vertices, distance);
   Contacts found = finish_on_host(Report::all);
-  add_places(found, {false, false, shared_.options.closest, AtTime::start}, {distance}, vertices, vertices);
+  add_places(found, Outputs::of_proximity(shared_.options), {distance}, vertices, vertices);
   shared_.profiler.mark("contacts");
   return found;
 }
@@ -250,6 +244,7 @@ DeviceResults GpuBackend::on_device(const gpu::FrameResult& f) {
   r.points = reinterpret_cast<decltype(r.points)>(f.points),
   r.normals = reinterpret_cast<decltype(r.normals)>(f.normals);
   r.closest = reinterpret_cast<decltype(r.closest)>(f.closest);
+  r.vertices = f.vertices, r.weights = reinterpret_cast<decltype(r.weights)>(f.weights), r.approach = f.approach;
   if (last_boxes_.until_best) pipeline_->choose_hints(r.first_toc);
   shared_.profiler.mark("contacts");
   return r;
@@ -443,7 +438,7 @@ Travel GpuBackend::travel_of_frame() const {
 // Computed on the device, except for rows that only integers can decide, which the CPU computes.
 DeviceResults GpuBackend::with_places(gpu::FrameResult found, Outputs outputs, const Separations& separations,
                                       Positions t0, Positions t1) {
-  if (!any(outputs) || found.n_vf + found.n_ee == 0) return on_device(found);
+  if (!outputs.any() || found.n_vf + found.n_ee == 0) return on_device(found);
   const auto open = pipeline_->find_places(found, outputs);
   if (!open) {
     DeviceResults all = on_device(found);
@@ -469,7 +464,7 @@ DeviceResults GpuBackend::with_places(gpu::FrameResult found, Outputs outputs, c
 
 void GpuBackend::add_places(Contacts& found, Outputs outputs, const Separations& separations, Positions t0,
                             Positions t1) {
-  if (!any(outputs)) return;
+  if (!outputs.any()) return;
   const bool snapshot = t0.data == t1.data;
   t0 = on_host(t0, 0), t1 = snapshot ? t0 : on_host(t1, 1);
   if (n_worlds() == 1)

@@ -165,9 +165,7 @@ void add_places(Contacts& c, Outputs outputs, const Features& features, const Se
     return static_cast<std::uint32_t>(std::lower_bound(edges.begin(), edges.end(), e) - edges.begin());
   };
   const std::size_t n = c.vf.size(), m = c.ee.size();
-  if (outputs.points) c.points.resize(n + m);
-  if (outputs.normals) c.normals.resize(n + m);
-  if (outputs.closest) c.closest.resize(n + m);
+  for_each_output(outputs, [&](auto list) { (c.*list).resize(n + m); });
   parallel_for(pool, n + m, 1024, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) {
       const bool vf = i < n;
@@ -234,12 +232,7 @@ Intersections intersections_of(const gpu::FrameResult& f, std::size_t n_worlds) 
 void add_places_of_worlds(Contacts& all, Outputs outputs, const Features& features, const Separations& separations,
                           Positions t0, Positions t1, ThreadPool& pool) {
   const std::size_t n = all.vf.size();
-  const auto each = [&](auto&& f) {
-    if (outputs.points) f(&Contacts::points);
-    if (outputs.normals) f(&Contacts::normals);
-    if (outputs.closest) f(&Contacts::closest);
-  };
-  each([&](auto list) { (all.*list).resize(n + all.ee.size()); });
+  for_each_output(outputs, [&](auto list) { (all.*list).resize(n + all.ee.size()); });
   for (std::size_t k = 0; k + 1 < all.slices.vf.size(); ++k) {
     const std::size_t vf = all.slices.vf[k], ee = all.slices.ee[k];
     const std::size_t n_vf = all.slices.vf[k + 1] - vf, n_ee = all.slices.ee[k + 1] - ee;
@@ -248,7 +241,7 @@ void add_places_of_worlds(Contacts& all, Outputs outputs, const Features& featur
     one.ee = copied(all.ee.data() + ee, n_ee), one.ee_toc = copied(all.ee_toc.data() + ee, n_ee);
     add_places(one, outputs, features, separations, of_world(t0, features.n_vertices, k),
                of_world(t1, features.n_vertices, k), pool);
-    each([&](auto list) {
+    for_each_output(outputs, [&](auto list) {
       std::copy_n((one.*list).begin(), n_vf, (all.*list).begin() + static_cast<std::ptrdiff_t>(vf));
       std::copy_n((one.*list).begin() + static_cast<std::ptrdiff_t>(n_vf), n_ee,
                   (all.*list).begin() + static_cast<std::ptrdiff_t>(n + ee));

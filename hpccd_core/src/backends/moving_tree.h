@@ -49,16 +49,20 @@ struct OwnTree {
 
 class MovingTree {
  public:
-  // The arguments must outlive the object.
-  MovingTree(const Scene& scene, const Features& features, ThreadPool& pool)
+  // The arguments must outlive the object. of_any_part: see MotionBounds.
+  MovingTree(const Scene& scene, const Features& features, ThreadPool& pool, bool of_any_part = false)
       : scene_(scene), features_(features), pool_(pool) {
-    motion_.features = &features;
+    motion_.features = &features, motion_.of_any_part = of_any_part;
   }
 
   // Bounds of a new motion. Throws InvalidArgument like MotionBounds::update.
   void bound(Positions t0, Positions t1, std::span<const double> separations);
   // The same for one snapshot.
   void bound(Positions vertices, double distance = 0);
+  // Other ends of these vertices, within the bounds that they have.
+  void shorten(Positions t0, Positions t1, std::span<const std::uint32_t> vertices) {
+    motion_.shorten(t0, t1, vertices, pool_);
+  }
   // Fits the tree: refits it, or rebuilds it if refitting has degraded it too much. Profiled as "refit" and "build".
   void fit(Profiler& profiler);
   void build_anew();

@@ -15,7 +15,7 @@
 #include "elementary/policy.h"
 #include "scene/features.h"
 #include "scene/vertex_motion.h"
-#include "traverse/tasks.h"
+#include "traverse/worker.h"
 
 namespace hpccd {
 
@@ -94,12 +94,7 @@ std::size_t most_listed_wide(const Features& features);
 
 class NearList {
  public:
-  // Pairs of one kind that are tested by one rule.
-  struct Group {
-    Kind kind;
-    Rule rule;
-    std::vector<std::uint32_t> first, second;
-  };
+  using Group = PairGroup;
 
   // Stores all pairs that are near in the snapshot where these motions begin, within the radius.
   void keep(std::vector<Group> groups, double radius, const std::vector<VertexMotion>& starts, ThreadPool& pool);

@@ -88,6 +88,24 @@ std::optional<std::vector<double>> WorldByWorld::earliest(Positions t0, Position
   return complete ? std::optional(std::move(times)) : std::nullopt;
 }
 
+std::optional<CollisionFreeMotion> WorldByWorld::free_motion(Positions t0, Positions t1,
+                                                             std::span<const std::int64_t> groups) {
+  std::vector<CollisionFreeMotion> motions;
+  const bool complete = answer(motions, [&](DetectionBackend& backend, std::size_t world) {
+    return backend.free_motion(of_world(t0, world), of_world(t1, world), groups);
+  });
+  if (!complete) return std::nullopt;
+  CollisionFreeMotion all;
+  for (std::size_t k = 0; k < motions.size(); ++k) {
+    const CollisionFreeMotion& m = motions[k];
+    all.vertices.insert(all.vertices.end(), m.vertices.begin(), m.vertices.end());
+    all.factors.insert(all.factors.end(), m.factors.begin(), m.factors.end());
+    for (const std::uint32_t v : m.stuck)
+      all.stuck.push_back(static_cast<std::uint32_t>(k * shared_.features.n_vertices) + v);
+  }
+  return all;
+}
+
 std::optional<Contacts> WorldByWorld::proximity(Positions vertices, double distance) {
   const bool complete = answer(contacts_of_worlds_, [&](DetectionBackend& backend, std::size_t world) {
     return backend.proximity(of_world(vertices, world), distance);

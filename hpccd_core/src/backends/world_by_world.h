@@ -18,6 +18,8 @@ class WorldByWorld : public DetectionBackend {
   // and names it.
   std::optional<Detection> detect(Positions t0, Positions t1) final;
   std::optional<std::vector<double>> earliest(Positions t0, Positions t1) final;
+  std::optional<CollisionFreeMotion> free_motion(Positions t0, Positions t1,
+                                                 std::span<const std::int64_t> groups) final;
   std::optional<Contacts> proximity(Positions vertices, double distance) final;
   std::optional<Intersections> intersections(Positions vertices) final;
   std::optional<std::vector<Gap>> distances(Positions vertices) final;

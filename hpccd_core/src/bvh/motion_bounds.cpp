@@ -56,11 +56,11 @@ template <class Real>
   throw InvalidArgument(std::string(name) + " changed while it was being read");
 }
 
-// box_map(x, k): coordinate k of a box.
+// box_map(x, k): coordinate k of a box. of_any_part: see MotionBounds; for grown boxes.
 template <bool grown, class Real, class BoxMap>
 void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, const BoxMap& box_map, double margin,
-                 std::size_t begin, std::size_t end, VertexMotion* vertices, RoundedMotion* rounded, MotionBox* boxes,
-                 VertexKdop* kdops) {
+                 bool of_any_part, std::size_t begin, std::size_t end, VertexMotion* vertices, RoundedMotion* rounded,
+                 MotionBox* boxes, VertexKdop* kdops) {
   for (std::size_t i = begin; i < end; ++i) {
     for (int k = 0; k < 3; ++k) {
       const double a = t0[3 * i + k], b = t1[3 * i + k];
@@ -72,8 +72,8 @@ void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, const
       if constexpr (grown) {
         boxes[i].t0.low[k] = box_map(a - margin, k);
         boxes[i].t0.high[k] = box_map(a + margin, k);
-        boxes[i].t1.low[k] = box_map(b - margin, k);
-        boxes[i].t1.high[k] = box_map(b + margin, k);
+        boxes[i].t1.low[k] = box_map((of_any_part && a < b ? a : b) - margin, k);
+        boxes[i].t1.high[k] = box_map((of_any_part && a > b ? a : b) + margin, k);
       } else {
         constexpr bool common = std::is_same_v<BoxMap, CoordinateMap>;
         boxes[i].t0.low[k] = boxes[i].t0.high[k] = common ? at_t0 : box_map(a, k);
@@ -205,13 +205,13 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
     resting.clear();
     pieces = pieces_of(parts_, moves);
   }
-  grown = std::ranges::any_of(margins_, [](double margin) { return margin > 0; });
+  grown = of_any_part || std::ranges::any_of(margins_, [](double margin) { return margin > 0; });
   was_snapshot_ = snapshot_;
   resize(vertices, n, pool.cancellation());
   resize(boxes, n, pool.cancellation());
   resize(kdops, n, pool.cancellation());
   if (!snapshot_) resize(rounded, n, pool.cancellation());
-  const auto squeezed_map = [this](double x, int k) { return squeezed[static_cast<std::size_t>(k)](x); };
+  const auto squeezed_map = this->squeezed_map();
   struct Along {
     float along[3];
   };
@@ -231,22 +231,39 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
   parallel_for(pool, pieces.size(), 1, [&](std::size_t from, std::size_t to, int) {
     for (std::size_t i = from; i < to; ++i) {
       const auto [begin, end, part] = pieces[i];
-      const auto copy = [&](const auto& box_map) {
-        if (margins_[part] > 0)
-          copy_motion<true>(t0, t1, map, box_map, margins_[part], begin, end, vertices.data(), rounded.data(),
-                            boxes.data(), kdops.data());
-        else
-          copy_motion<false>(t0, t1, map, box_map, 0, begin, end, vertices.data(), rounded.data(), boxes.data(),
-                             kdops.data());
-      };
       if (!snapshot_)
-        squeezed.empty() ? copy(map) : copy(squeezed_map);
+        copy(t0, t1, begin, end, margins_[part]);
       else if (!squeezed.empty())
         copy_snapshot(t0, squeezed_map, chosen_slanted, begin, end, vertices.data(), boxes.data());
       else if (!common)
         copy_snapshot(t0, map, chosen_slanted, begin, end, vertices.data(), boxes.data());
       else
         copy_snapshot(t0, map, common_slanted, begin, end, vertices.data(), boxes.data());
+    }
+  });
+}
+
+template <class Real>
+void MotionBounds::copy(const Real* t0, const Real* t1, std::size_t begin, std::size_t end, double margin) {
+  const auto copy = [&](const auto& box_map) {
+    if (margin > 0 || of_any_part)
+      copy_motion<true>(t0, t1, map, box_map, margin, of_any_part, begin, end, vertices.data(), rounded.data(),
+                        boxes.data(), kdops.data());
+    else
+      copy_motion<false>(t0, t1, map, box_map, 0, false, begin, end, vertices.data(), rounded.data(), boxes.data(),
+                         kdops.data());
+  };
+  squeezed.empty() ? copy(map) : copy(squeezed_map());
+}
+
+void MotionBounds::shorten(Positions t0, Positions t1, std::span<const std::uint32_t> changed, ThreadPool& pool) {
+  parallel_for(pool, changed.size(), grain, [&](std::size_t begin, std::size_t end, int) {
+    for (const std::uint32_t i : changed.subspan(begin, end - begin)) {
+      const double margin = margins_[features->mesh_of_vertex[i]];
+      if (t0.is_double)
+        copy(static_cast<const double*>(t0.data), static_cast<const double*>(t1.data), i, i + 1, margin);
+      else
+        copy(static_cast<const float*>(t0.data), static_cast<const float*>(t1.data), i, i + 1, margin);
     }
   });
 }

@@ -33,6 +33,8 @@ struct Extent {
 struct MotionBounds {
   // Their edges show how fine the scene is. Without features the scene counts as coarse.
   const Features* features = nullptr;
+  // The boxes at the end contain the whole way, so that those of any shorter motions lie within them.
+  bool of_any_part = false;
   std::vector<VertexMotion> vertices;
   std::vector<MotionBox> boxes;
   bool grown = false;  // some contain more than their vertex: half a separation around it
@@ -66,6 +68,8 @@ struct MotionBounds {
   // second end (SlantedDirection); without k-DOPs. `distance`: features count as near up to this distance, if it is
   // known.
   void update(const Scene& scene, Positions vertices, ThreadPool& pool, double distance = 0);
+  // Other ends of these vertices, within the boxes that they have.
+  void shorten(Positions vertices_t0, Positions vertices_t1, std::span<const std::uint32_t> changed, ThreadPool& pool);
   // The same for vertices without a scene, without separations.
   void update(Positions vertices_t0, Positions vertices_t1, ThreadPool& pool);
   void sweep(ThreadPool& pool);
@@ -80,6 +84,11 @@ struct MotionBounds {
   template <class Real>
   void update(const Real* t0, const Real* t1, std::size_t n, std::span<const double> separations, ThreadPool& pool);
   void update_all(Positions t0, Positions t1, std::span<const double> separations, ThreadPool& pool);
+  auto squeezed_map() const {
+    return [this](double x, int k) { return squeezed[static_cast<std::size_t>(k)](x); };
+  }
+  template <class Real>
+  void copy(const Real* t0, const Real* t1, std::size_t begin, std::size_t end, double margin);
   template <class Real>
   void measure_edges(const Real* t0, const Real* t1);
   double finest() const;

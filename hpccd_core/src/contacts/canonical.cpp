@@ -60,7 +60,9 @@ void collect_contacts(std::vector<Worker>& workers, const Geometry& geometry, Re
   for (const Worker& w : workers) n += w.vertex_face.size(), m += w.edge_edge.size();
 
   // New memory is mapped page by page, which takes as long as the sorting: each array is filled by its own thread.
-  order.distribute(workers, pool, 7, [&](std::size_t array) {
+  std::size_t n_outputs = 0;
+  for_each_output(outputs, [&](auto) { ++n_outputs; });
+  order.distribute(workers, pool, 4 + n_outputs, [&](std::size_t array) {
     switch (array) {
       case 0:
         return resize(c.ee, m, cancellation);
@@ -70,12 +72,11 @@ void collect_contacts(std::vector<Worker>& workers, const Geometry& geometry, Re
         return resize(c.vf, n, cancellation);
       case 3:
         return resize(c.vf_toc, n, cancellation);
-      case 4:
-        return resize(c.points, outputs.points ? n + m : 0, cancellation);
-      case 5:
-        return resize(c.normals, outputs.normals ? n + m : 0, cancellation);
       default:
-        return resize(c.closest, outputs.closest ? n + m : 0, cancellation);
+        std::size_t output = 4;
+        for_each_output(outputs, [&](auto list) {
+          if (output++ == array) resize(c.*list, n + m, cancellation);
+        });
     }
   });
   std::vector<Summary> summary(static_cast<std::size_t>(pool.size()));

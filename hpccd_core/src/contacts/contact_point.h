@@ -3,6 +3,7 @@
 #pragma once
 
 #include "contacts/arbiters.h"
+#include "contacts/face_place.h"
 #include "contacts/meeting_point.h"
 #include "elementary/inside.h"
 
@@ -33,11 +34,19 @@ class ContactPoint {
     regular_ = in_range(size) && largest(n_) > flat * (size.a * size.b);
   }
 
-  // The vertex; or the point of the shorter edge where the other one crosses it; for parallel edges the middle of their
-  // overlap. The numbering of vertices and the order of edges affect neither this nor the normal.
-  HPCCD_HOST_DEVICE V point() const {
-    if constexpr (kind == Kind::vertex_face) return at(0);
-    return crossing();
+  // Where the features touch. For parallel edges the middle of their overlap.
+  HPCCD_HOST_DEVICE Places places() const {
+    if constexpr (kind == Kind::edge_edge) return crossing();
+    if (!regular_) return face_place(p_, a_, b_);
+    const double per_nn = 1 / nn_, alpha = clamped(per_nn * dot(cross(p_, b_), n_));
+    return {alpha, lesser(1 - alpha, greater(0.0, per_nn * dot(cross(a_, p_), n_)))};
+  }
+
+  // The vertex; or the point of the shorter edge. The numbering of vertices and the order of edges affect neither this
+  // nor the normal.
+  HPCCD_HOST_DEVICE V point(Places places) const {
+    if (kind == Kind::vertex_face) return at(0);
+    return a_shorter() ? at(0) + places.alpha * a_ : at(2) + -places.beta * b_;
   }
 
   // Unit length, at toc: perpendicular to the face, towards the side of the vertex just before toc, or a x b, from a
@@ -69,21 +78,25 @@ class ContactPoint {
     return slope < 0 ? 1 : -1;
   }
 
-  // On the shorter edge: a point within rounding errors of it need not be within 1e-9 of the longer edge's length on
-  // that one.
-  HPCCD_HOST_DEVICE V crossing() const {
-    const double size_a = largest(a_), size_b = largest(b_);
-    const bool a_shorter = size_a < size_b;
-    const auto on_shorter = [&](double place) { return a_shorter ? at(0) + place * a_ : at(2) + place * b_; };
+  HPCCD_HD bool a_shorter() const { return largest(a_) < largest(b_); }
+
+  // First on the shorter edge: a point within rounding errors of it need not be within 1e-9 of the longer edge's length
+  // on that one.
+  HPCCD_HOST_DEVICE Places crossing() const {
     if (regular_) {
       const double per_nn = 1 / nn_;
       const double on_a = clamped(per_nn * dot(cross(p_, b_), n_)), on_b = clamped(per_nn * dot(cross(p_, a_), n_));
       // A gap perpendicular to both edges does not affect the point.
       const V gap = p_ + on_b * b_ - on_a * a_, along = gap - (per_nn * dot(gap, n_)) * n_;
-      if (largest(along) <= 1e-10 * greater(size_b, size_a)) return on_shorter(a_shorter ? on_a : on_b);
+      if (largest(along) <= 1e-10 * greater(largest(b_), largest(a_))) return {on_a, -on_b};
     }
     const Segment a{{0, 0, 0}, a_}, b{p_, b_};
-    return on_shorter(a_shorter ? meeting_place(b, a) : meeting_place(a, b));
+    if (a_shorter()) {
+      const double on_a = meeting_place(b, a);
+      return {on_a, -nearest_place(b, a.at(on_a))};
+    }
+    const double on_b = meeting_place(a, b);
+    return {nearest_place(a, b.at(on_b)), -on_b};
   }
 
   const V *t0_, *t1_;

@@ -7,7 +7,7 @@
 
 #include "base/double_double.h"
 #include "contacts/meeting_point.h"
-#include "contacts/nearest_points.h"
+#include "contacts/places.h"
 #include "elementary/exact/distance.h"
 #include "elementary/inside.h"
 #include "elementary/intersection_batch.h"
@@ -84,8 +84,12 @@ Gap gap_of(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& found,
     gap.kind = GapKind::edge_edge;
     gap.features = {a[0], a[1], b[0], b[1]};
   }
-  const NearestPoints points = nearest_points(undecided_pair(g, {found.first, found.second, found.kind}), 0);
-  gap.points = {point_of(points.on_first), point_of(points.on_second)};
+  constexpr Outputs wanted{false, true, true, true, AtTime::start};
+  const PairPlaces places = pair_places(undecided_pair(g, {found.first, found.second, found.kind}), 0, wanted);
+  gap.points = {point_of(places.closest[0]), point_of(places.closest[1])};
+  pair_vertices(g, found.kind, found.first, found.second, gap.vertices.data());
+  std::ranges::copy(places.weights, gap.weights.begin());
+  gap.normal = point_of(places.normal);
   return gap;
 }
 

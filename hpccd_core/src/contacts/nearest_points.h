@@ -3,7 +3,7 @@
 #pragma once
 
 #include "contacts/arbiters.h"
-#include "contacts/meeting_point.h"
+#include "contacts/face_place.h"
 #include "elementary/distance/proximity_test.h"
 #include "elementary/fallback.h"
 
@@ -13,7 +13,8 @@ struct NearestPoints {
   double distance;
   Vec3<double> on_first, on_second;  // on the vertex and the face, or on edge a and edge b
   Vec3<double> direction;            // unit length: from face to vertex, or from edge a to edge b; zero at distance 0
-  bool certain;                      // the direction is reliable: not dominated by rounding errors of positions
+  Places places;
+  bool certain;  // the direction is reliable: not dominated by rounding errors of positions
 };
 
 // At a time of the step. For parallel edges: in the middle of the stretch along which they are nearest.
@@ -38,7 +39,11 @@ HPCCD_HD NearestPoints nearest_points(const Vec3<double> t0[4], const Vec3<doubl
   if (!place_is_known || !checked.far) {
     const exact::Nearest x = arbiter.nearest(kind, t0, t1, q);
     const V across = kind == Kind::vertex_face ? x.on_first - x.on_second : x.on_second - x.on_first;
-    return {x.distance, x.on_first, x.on_second, x.distance > 0 ? unit(across) : V{0, 0, 0}, x.distance > long_enough};
+    const Places places = kind == Kind::vertex_face ? face_place(x.on_second - q[1], now.a, now.b)
+                                                    : Places{nearest_place({q[0], now.a}, x.on_first),
+                                                             -nearest_place({q[2], now.b}, x.on_second)};
+    const V direction = x.distance > 0 ? unit(across) : V{0, 0, 0};
+    return {x.distance, x.on_first, x.on_second, direction, places, x.distance > long_enough};
   }
   const detail::Place<double> place = detail::best_place<kind>(now);
   const Nearest<double> found = detail::straightened(place, now);
@@ -48,8 +53,8 @@ HPCCD_HD NearestPoints nearest_points(const Vec3<double> t0[4], const Vec3<doubl
   const bool certain = distance > long_enough || (place.inside && distance > 0x1p-45 * size &&
                                                   largest(n) > long_enough * (largest(now.a) + largest(now.b)));
   if constexpr (kind == Kind::vertex_face)
-    return {distance, q[0], q[1] + found.x * now.a + found.y * now.b, direction, certain};
-  return {distance, q[0] + found.x * now.a, q[2] - found.y * now.b, direction, certain};
+    return {distance, q[0], q[1] + found.x * now.a + found.y * now.b, direction, {found.x, found.y}, certain};
+  return {distance, q[0] + found.x * now.a, q[2] - found.y * now.b, direction, {found.x, found.y}, certain};
 }
 
 NearestPoints nearest_points(const UndecidedPair& pair, double time);

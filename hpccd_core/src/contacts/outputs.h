@@ -3,6 +3,7 @@
 #pragma once
 
 #include "base/vec3.h"
+#include "hpccd/options.h"
 
 namespace hpccd {
 
@@ -10,13 +11,19 @@ namespace hpccd {
 enum class AtTime : bool { contact, start };
 
 struct Outputs {
-  bool points, normals, closest;
+  bool points, normals, closest, weights;  // weights: with vertices, and with the approach at the time of contact
   AtTime at;
+
+  static Outputs of_contacts(const Options& o) { return {o.points, o.normals, o.closest, o.weights, AtTime::contact}; }
+  static Outputs of_proximity(const Options& o) { return {false, o.normals, o.closest, o.weights, AtTime::start}; }
+  bool any() const { return points || normals || closest || weights; }
 };
 
 struct PairPlaces {
   Vec3<double> point, normal;
   Vec3<double> closest[2];  // positions on the first and on the second feature
+  double weights[4];
+  double approach;
 };
 
 }  // namespace hpccd

@@ -58,7 +58,8 @@ void check_rows(const ContactsOfPart& of) {
   const std::size_t n = of.vf.size() + of.ee.size();
   const auto all_or_none = [n](const auto& places) { return places.empty() || places.size() == n; };
   if (of.vf.size() != of.vf_toc.size() || of.ee.size() != of.ee_toc.size() || !all_or_none(of.points) ||
-      !all_or_none(of.normals) || !all_or_none(of.closest))
+      !all_or_none(of.normals) || !all_or_none(of.closest) || !all_or_none(of.vertices) || !all_or_none(of.weights) ||
+      !all_or_none(of.approach))
     throw InvalidArgument("results: contacts of unequal lengths; give them as a detector returned them");
 }
 
@@ -106,7 +107,18 @@ Contacts contacts_of_step(std::span<const ContactsOfPart> answers) {
   add_places(step.points, &ContactsOfPart::points);
   add_places(step.normals, &ContactsOfPart::normals);
   add_places(step.closest, &ContactsOfPart::closest);
-  step.hash = hash_of_contacts({step.vf, step.vf_toc, step.ee, step.ee_toc, {}, {}, {}});
+  add_places(step.vertices, &ContactsOfPart::vertices);
+  add_places(step.weights, &ContactsOfPart::weights);
+  add_places(step.approach, &ContactsOfPart::approach);
+  // Per step, which takes as many times as long as a part.
+  const auto rows = [&](const std::vector<Row>& of, std::size_t begin) {
+    for (std::size_t i = 0; i < of.size() && !step.approach.empty(); ++i)
+      step.approach[begin + i] *= answers[of[i].answer].parts;
+  };
+  rows(of_vf, 0), rows(of_ee, of_vf.size());
+  ContactsOfPart features;
+  features.vf = step.vf, features.vf_toc = step.vf_toc, features.ee = step.ee, features.ee_toc = step.ee_toc;
+  step.hash = hash_of_contacts(features);
   return step;
 }
 

@@ -16,6 +16,9 @@ struct ContactsOfPart {
   std::span<const double> ee_toc;
   std::span<const std::array<double, 3>> points, normals;
   std::span<const std::array<std::array<double, 3>, 2>> closest;
+  std::span<const std::array<std::uint32_t, 4>> vertices;
+  std::span<const std::array<double, 4>> weights;
+  std::span<const double> approach;
   double part = 0, parts = 1;
 };
 

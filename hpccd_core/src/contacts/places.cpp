@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "contacts/places.h"
 
+#include <algorithm>
+
 #include "contacts/pair_places.h"
 
 namespace hpccd {
@@ -21,12 +23,16 @@ void write_places(Contacts& c, std::size_t i, const UndecidedPair& pair, double 
   if (outputs.points) c.points[i] = row(places.point);
   if (outputs.normals) c.normals[i] = row(places.normal);
   if (outputs.closest) c.closest[i] = {row(places.closest[0]), row(places.closest[1])};
+  if (!outputs.weights) return;
+  std::ranges::copy(places.weights, c.weights[i].begin());
+  if (outputs.at == AtTime::contact) c.approach[i] = places.approach;
 }
 
 void write_places(Contacts& c, std::size_t i, const Candidate& pair, double toc, const Geometry& geometry,
                   Outputs outputs) {
-  if (outputs.points || outputs.normals || outputs.closest)
-    write_places(c, i, undecided_pair(geometry, pair), toc, outputs);
+  if (!outputs.any()) return;
+  write_places(c, i, undecided_pair(geometry, pair), toc, outputs);
+  if (outputs.weights) pair_vertices(geometry, pair.kind, pair.first, pair.second, c.vertices[i].data());
 }
 
 }  // namespace hpccd

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points, normals and nearest points of contacts, as far as they are requested.
+// Outputs of contacts on request: points, normals, nearest points, vertices, weights and approach.
 #pragma once
 
 #include "contacts/outputs.h"
@@ -8,6 +8,19 @@
 #include "elementary/undecided.h"
 
 namespace hpccd {
+
+constexpr Outputs all_outputs{true, true, true, true, AtTime::contact};
+
+// f(&Contacts::points) and so on for each output that is requested.
+template <class F>
+void for_each_output(Outputs outputs, F&& f) {
+  if (outputs.points) f(&Contacts::points);
+  if (outputs.normals) f(&Contacts::normals);
+  if (outputs.closest) f(&Contacts::closest);
+  if (!outputs.weights) return;
+  f(&Contacts::vertices), f(&Contacts::weights);
+  if (outputs.at == AtTime::contact) f(&Contacts::approach);
+}
 
 PairPlaces pair_places(const UndecidedPair& pair, double toc, Outputs outputs);
 

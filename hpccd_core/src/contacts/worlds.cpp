@@ -52,19 +52,16 @@ void join_worlds(std::vector<Contacts>& worlds, ThreadPool& pool, Contacts& all)
   for (const Contacts& w : worlds) all.first_tocs.push_back(w.first_toc);
   all.first_toc = *std::ranges::min_element(all.first_tocs);
 
-  // All worlds have the same outputs.
+  // All worlds have the same outputs, which worlds without contacts do not show.
   const auto rows_of = [&](auto Contacts::* list) {
     return std::ranges::any_of(worlds, [&](const Contacts& w) { return !(w.*list).empty(); }) ? n + m : 0;
   };
   const auto make_room = [&](auto Contacts::* list, std::size_t rows) { resize(all.*list, rows, cancellation); };
-  const std::function<void()> rooms[] = {[&] { make_room(&Contacts::vf, n); },
-                                         [&] { make_room(&Contacts::vf_toc, n); },
-                                         [&] { make_room(&Contacts::ee, m); },
-                                         [&] { make_room(&Contacts::ee_toc, m); },
-                                         [&] { make_room(&Contacts::points, rows_of(&Contacts::points)); },
-                                         [&] { make_room(&Contacts::normals, rows_of(&Contacts::normals)); },
-                                         [&] { make_room(&Contacts::closest, rows_of(&Contacts::closest)); }};
-  parallel_for_each(pool, std::size(rooms), [&](std::size_t i) { rooms[i](); });
+  std::vector<std::function<void()>> rooms = {
+      [&] { make_room(&Contacts::vf, n); }, [&] { make_room(&Contacts::vf_toc, n); },
+      [&] { make_room(&Contacts::ee, m); }, [&] { make_room(&Contacts::ee_toc, m); }};
+  for_each_output(all_outputs, [&](auto list) { rooms.emplace_back([&, list] { make_room(list, rows_of(list)); }); });
+  parallel_for_each(pool, rooms.size(), [&](std::size_t i) { rooms[i](); });
 
   parallel_for(pool, worlds.size(), worlds_a_piece, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t k = begin; k < end; ++k) {
@@ -79,7 +76,7 @@ void join_worlds(std::vector<Contacts>& worlds, ThreadPool& pool, Contacts& all)
         copy_rows(w.*list, 0, w.vf.size(), all.*list, vf, cancellation);
         copy_rows(w.*list, w.vf.size(), w.ee.size(), all.*list, n + ee, cancellation);
       };
-      copy_places(&Contacts::points), copy_places(&Contacts::normals), copy_places(&Contacts::closest);
+      for_each_output(all_outputs, copy_places);
       worlds[k] = {};
     }
   });

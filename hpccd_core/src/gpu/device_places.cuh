@@ -17,17 +17,31 @@ class DevicePlaces {
   // decide, which are not written; or nothing if there are too many, and the host should compute all rows. Waits for
   // the stream.
   template <class T>
-  std::optional<std::vector<OpenRow>> find(const LaunchParams<T>& params, const FrameResult& r, const PlacesOut& to,
-                                           const Stages& stages) {
-    const u64 n = r.n_vf + r.n_ee;
+  std::optional<std::vector<OpenRow>> find(const LaunchParams<T>& params, const FrameResult& r, const u64* n_rows,
+                                           const PlacesOut& to, const Stages& stages) {
+    reserve(r.n_vf + r.n_ee);
+    const PlacesTask task = launch(params, r, n_rows, to, stages);
+    u64 n_open[2] = {};
+    fetch(n_open, n_open_.data(), 2, stages.stream);
+    if (n_open[0] > task.open_capacity) return std::nullopt;
+    std::vector<OpenRow> open(n_open[1]);
+    fetch(open.data(), to_host_.data(), n_open[1], stages.stream);
+    return open;
+  }
+
+  // For up to this many rows.
+  void reserve(u64 n_rows) {
     n_open_.reserve(2);
-    const auto room = static_cast<std::size_t>(std::max<u64>(n / most_open, 16384));
-    open_.reserve(room);
+    open_.reserve(static_cast<std::size_t>(std::max<u64>(n_rows / most_open, 16384)));
     to_host_.reserve(open_.size());
+  }
+  // The rows of a frame: as many as n_rows says when the stream gets there. Does not wait, and allocates nothing.
+  template <class T>
+  PlacesTask launch(const LaunchParams<T>& params, const FrameResult& r, const u64* n_rows, const PlacesOut& to,
+                    const Stages& stages) {
     check(cudaMemsetAsync(n_open_.data(), 0, n_open_.bytes(), stages.stream), "cudaMemsetAsync");
     const auto offsets = [](const std::uint64_t* p) { return reinterpret_cast<const u64*>(p); };
-    const PlacesTask task{r.n_vf,
-                          r.n_ee,
+    const PlacesTask task{n_rows,
                           reinterpret_cast<const uint2*>(r.vf),
                           reinterpret_cast<const uint4*>(r.ee),
                           r.toc,
@@ -40,12 +54,7 @@ class DevicePlaces {
                           n_open_.data()};
     launch_places(params, task, stages);
     launch_places_in_integers(task, stages);
-    u64 n_open[2] = {};
-    fetch(n_open, n_open_.data(), 2, stages.stream);
-    if (n_open[0] > task.open_capacity) return std::nullopt;
-    std::vector<OpenRow> open(n_open[1]);
-    fetch(open.data(), to_host_.data(), n_open[1], stages.stream);
-    return open;
+    return task;
   }
 
   // Writes the host's results for the rows that were returned last.

@@ -136,6 +136,7 @@ class DevicePipeline : public Pipeline {
   void launch_area(const LaunchParams<T>& params);
   template <class T>
   void enqueue_frame();
+  void give_places(FrameResult& r) const;
   Stages on_stream() { return {multiprocessors_, on_, timer_}; }
   template <class Use>
   void with_last_frame(Use&& use);
@@ -356,6 +357,9 @@ PreparedResults DevicePipeline::prepare(Positions t0, Positions t1, double room)
   prepared_counts_ = std::make_shared<DeviceBuffer<PreparedCounts>>();
   prepared_counts_->reserve(1);
   const ResultPlaces to = contacts_.reserve_rows(roomy(c.rows[0]), roomy(c.rows[1]));
+  const Outputs outputs = Outputs::of_contacts(options_);
+  places_out_ = contacts_.reserve_places(to.most_vf + to.most_ee, outputs);
+  if (outputs.any()) places_.reserve(to.most_vf + to.most_ee);
   enqueue(stream_);  // lazy loading and lookups cannot be captured
   check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
   const FrameResult r = contacts_.result(query_, c);
@@ -365,6 +369,12 @@ PreparedResults DevicePipeline::prepare(Positions t0, Positions t1, double room)
   p.room_vf = to.most_vf, p.room_ee = to.most_ee;
   p.vf = r.vf, p.ee = r.ee, p.tocs = r.toc, p.counts = prepared_counts_->data();
   p.vf_offsets = r.vf_offsets, p.ee_offsets = r.ee_offsets, p.hashes = r.hashes, p.first_tocs = r.first_tocs;
+  FrameResult o;
+  give_places(o);
+  p.points = reinterpret_cast<decltype(p.points)>(o.points);
+  p.normals = reinterpret_cast<decltype(p.normals)>(o.normals);
+  p.closest = reinterpret_cast<decltype(p.closest)>(o.closest);
+  p.vertices = o.vertices, p.weights = reinterpret_cast<decltype(p.weights)>(o.weights), p.approach = o.approach;
   return p;
 }
 
@@ -402,17 +412,32 @@ void DevicePipeline::enqueue_frame() {
        contacts_.capacity()},
       to, prepared_counts_->data());
   check_launch("tell_kernel");
+  if (tree_.empty() || !places_out_.outputs.any()) return;
+  scene_.fill_separations(params);
+  const auto* n_rows = reinterpret_cast<const u64*>(&prepared_counts_->data()->vertex_face);
+  const PlacesTask task = places_.launch(params, contacts_.result(query_, {}), n_rows, places_out_, on_stream());
+  tell_places_kernel<<<blocks_for(options_.worlds + 1, 256), 256, 0, on_>>>(task, options_.worlds, to,
+                                                                            prepared_counts_->data());
+  check_launch("tell_places_kernel");
+}
+
+void DevicePipeline::give_places(FrameResult& r) const {
+  const Outputs& outputs = places_out_.outputs;
+  if (outputs.points) r.points = places_out_.points;
+  if (outputs.normals) r.normals = places_out_.normals;
+  if (outputs.closest) r.closest = places_out_.closest;
+  if (!outputs.weights) return;
+  r.vertices = reinterpret_cast<decltype(r.vertices)>(places_out_.vertices), r.weights = places_out_.weights;
+  if (outputs.at == AtTime::contact) r.approach = places_out_.approach;
 }
 
 std::optional<std::vector<OpenRow>> DevicePipeline::find_places(FrameResult& r, Outputs outputs) {
   places_out_ = contacts_.reserve_places(r.n_vf + r.n_ee, outputs);
-  if (outputs.points) r.points = places_out_.points;
-  if (outputs.normals) r.normals = places_out_.normals;
-  if (outputs.closest) r.closest = places_out_.closest;
+  give_places(r);
   std::optional<std::vector<OpenRow>> open;
   with_last_frame([&](auto params) {
     if (!of_snapshot(query_)) scene_.fill_separations(params);
-    open = places_.find(params, r, places_out_, on_stream());
+    open = places_.find(params, r, counters_.data()->rows, places_out_, on_stream());
   });
   return open;
 }

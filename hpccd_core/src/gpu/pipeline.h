@@ -37,7 +37,8 @@ struct FrameResult {
   std::uint64_t hash = 0;
   double first_toc = std::numeric_limits<double>::infinity();
   // For each row of vf, then of ee, as far as requested.
-  const double *points = nullptr, *normals = nullptr, *closest = nullptr;
+  const double *points = nullptr, *normals = nullptr, *closest = nullptr, *weights = nullptr, *approach = nullptr;
+  const std::array<std::uint32_t, 4>* vertices = nullptr;
   // For several worlds (WorldSlices, Contacts::first_tocs).
   const std::uint64_t *vf_offsets = nullptr, *ee_offsets = nullptr, *ef_offsets = nullptr, *hashes = nullptr;
   const double* first_tocs = nullptr;

@@ -28,7 +28,7 @@ __global__ void collect_open_rows_kernel(const __grid_constant__ PlacesTask task
 }  // namespace
 
 void launch_places_in_integers(const PlacesTask& task, const Stages& stages) {
-  if (task.out.outputs.normals)
+  if (task.out.outputs.normals || task.out.outputs.weights)
     stages.one_item_each(places_in_integers_kernel, 128, task.open_capacity, "places_in_integers_kernel", task);
   collect_open_rows_kernel<<<static_cast<unsigned>(stages.multiprocessors), 256, 0, stages.stream>>>(task);
   check_launch("collect_open_rows_kernel");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points, normals and nearest points, bit-identical to the CPU's, one thread per row.
+// Outputs of pairs, bit-identical to the CPU's, one thread per row.
 #include "gpu/feature_pair.cuh"
 #include "gpu/pair_lists.cuh"
 #include "gpu/write_places.cuh"
@@ -17,14 +17,14 @@ __device__ u32 world_of_row(const u64* offsets, u32 n_worlds, u64 row) {
   return low;
 }
 
-// The vertices of a row as those of pairs, numbered through all worlds.
+// The vertices of a row as those of pairs, numbered through all worlds; `base`: those of the worlds before.
 template <class T>
-__device__ uint4 vertices_of_row(const LaunchParams<T>& params, const PlacesTask& task, u64 row) {
-  const bool edges = row >= task.n_vf;
-  const u64 own = edges ? row - task.n_vf : row;
+__device__ uint4 vertices_of_row(const LaunchParams<T>& params, const PlacesTask& task, u64 row, u32& base) {
+  const bool edges = row >= task.n_rows[0];
+  const u64 own = edges ? row - task.n_rows[0] : row;
   const u32 world =
       params.n_worlds == 1 ? 0 : world_of_row(edges ? task.ee_offsets : task.vf_offsets, params.n_worlds, own);
-  const u32 base = world * params.n_vertices;
+  base = world * params.n_vertices;
   uint4 v;
   if (edges) {
     v = task.ee[own];
@@ -38,9 +38,11 @@ __device__ uint4 vertices_of_row(const LaunchParams<T>& params, const PlacesTask
 template <class T>
 __global__ __launch_bounds__(128) void places_kernel(const __grid_constant__ LaunchParams<T> params,
                                                      const __grid_constant__ PlacesTask task) {
-  const u64 n = task.n_vf + task.n_ee, stride = static_cast<u64>(gridDim.x) * blockDim.x;
+  const u64 n = task.n_rows[0] + task.n_rows[1], stride = static_cast<u64>(gridDim.x) * blockDim.x;
   for (u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x; i < n; i += stride) {
-    const uint4 v = vertices_of_row(params, task, i);
+    u32 base;
+    const uint4 v = vertices_of_row(params, task, i, base);
+    if (task.out.outputs.weights) task.out.vertices[i] = {v.x - base, v.y - base, v.z - base, v.w - base};
     const PairEnds q = load_pair_ends(params.vertices, v);
     OpenRow row;
     row.row = i, row.toc = task.tocs[i], row.separation = separation_of(params, v.x, v.z);

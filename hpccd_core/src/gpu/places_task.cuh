@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rows for which points, normals and nearest points are requested, and the output arrays. All pointers are to
+// The rows for which outputs are requested, and the output arrays. All pointers are to
 // device memory.
 #pragma once
 
@@ -14,15 +14,18 @@ struct PlacesOut {
   Outputs outputs;
   double *points, *normals;  // three per row
   double* closest;           // six per row
+  uint4* vertices;
+  double* weights;  // four per row
+  double* approach;
 };
 
 struct PlacesTask {
-  u64 n_vf, n_ee;
+  const u64* n_rows;  // vertex-face pairs, and the others
   const uint2* vf;
   const uint4* ee;
   const double* tocs;                  // of the vertex-face pairs, then of the others
   const u64 *vf_offsets, *ee_offsets;  // for several worlds
-  PlacesOut out;
+  PlacesOut out{};
   // Rows that only integers can decide; and among these, rows that fixed-size integers cannot. Counters continue beyond
   // the capacity.
   OpenRow *open, *to_host;

@@ -60,12 +60,15 @@ class RowsIn final : public ResultRows {
     if (outputs.points) points_.reserve(3 * n);
     if (outputs.normals) normals_.reserve(3 * n);
     if (outputs.closest) closest_.reserve(6 * n);
-    return {outputs, points_.data(), normals_.data(), closest_.data()};
+    if (outputs.weights) vertices_.reserve(n), weights_.reserve(4 * n), approach_.reserve(n);
+    return {outputs,          points_.data(),  normals_.data(), closest_.data(),
+            vertices_.data(), weights_.data(), approach_.data()};
   }
   std::size_t device_bytes() const override {
     return std::is_same_v<Memory, DeviceMemory>
                ? vf_.bytes() + ee_.bytes() + ef_.bytes() + toc_.bytes() + 2 * offsets_[0].bytes() + hashes_.bytes() +
-                     first_tocs_.bytes() + points_.bytes() + normals_.bytes() + closest_.bytes()
+                     first_tocs_.bytes() + points_.bytes() + normals_.bytes() + closest_.bytes() + vertices_.bytes() +
+                     weights_.bytes() + approach_.bytes()
                : 0;
   }
 
@@ -76,7 +79,8 @@ class RowsIn final : public ResultRows {
   Buffer<double, Memory> toc_;
   Buffer<u64, Memory> offsets_[2], hashes_;
   Buffer<double, Memory> first_tocs_;
-  Buffer<double, Memory> points_, normals_, closest_;
+  Buffer<double, Memory> points_, normals_, closest_, weights_, approach_;
+  Buffer<uint4, Memory> vertices_;
 };
 
 // Rows for the caller: they are reused for another frame once they are no longer held.

@@ -61,12 +61,13 @@ DeviceResults pairs_to_device(const Pairs& p, const std::vector<double>& vf_valu
   r.vf = memory.keep(p.vf), r.ee = memory.keep(p.ee);
   r.values = memory.keep<double>(vf_values, r.n_vf + r.n_ee, 0, nullptr);
   memory.keep<double>(ee_values, 0, r.n_vf, r.values);
-  r.closest = memory.keep_if_any(p.closest);
+  r.closest = memory.keep_if_any(p.closest), r.normals = memory.keep_if_any(p.normals);
+  r.vertices = memory.keep_if_any(p.vertices), r.weights = memory.keep_if_any(p.weights);
   r.hash = p.hash;
   r.vf_offsets = memory.keep_if_any(p.slices.vf), r.ee_offsets = memory.keep_if_any(p.slices.ee);
   r.hashes = memory.keep_if_any(p.slices.hashes);
   if constexpr (requires { p.first_tocs; }) {
-    r.points = memory.keep_if_any(p.points), r.normals = memory.keep_if_any(p.normals);
+    r.points = memory.keep_if_any(p.points), r.approach = memory.keep_if_any(p.approach);
     r.first_tocs = memory.keep_if_any(p.first_tocs), r.first_toc = p.first_toc;
   }
   return r;
@@ -93,6 +94,8 @@ void add_places(DeviceResults& r, const Contacts& c) {
   Memory memory(r.device);
   r.points = memory.keep_if_any(c.points), r.normals = memory.keep_if_any(c.normals);
   r.closest = memory.keep_if_any(c.closest);
+  r.vertices = memory.keep_if_any(c.vertices), r.weights = memory.keep_if_any(c.weights);
+  r.approach = memory.keep_if_any(c.approach);
   // One owner of both.
   r.memory = std::make_shared<std::pair<std::shared_ptr<const void>, std::shared_ptr<const void>>>(
       r.memory, memory.begin().memory);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes point, normal and nearest points of one row.
+// Writes the outputs of one row.
 #pragma once
 
 #include "gpu/places_task.cuh"
@@ -11,8 +11,11 @@ __device__ inline void write_vector(double* to, const Vec3<double>& v) { to[0] =
 __device__ inline void write_places(const PlacesOut& out, u64 row, const PairPlaces& places) {
   if (out.outputs.points) write_vector(out.points + 3 * row, places.point);
   if (out.outputs.normals) write_vector(out.normals + 3 * row, places.normal);
-  if (!out.outputs.closest) return;
-  for (int i = 0; i < 2; ++i) write_vector(out.closest + 6 * row + 3 * i, places.closest[i]);
+  if (out.outputs.closest)
+    for (int i = 0; i < 2; ++i) write_vector(out.closest + 6 * row + 3 * i, places.closest[i]);
+  if (!out.outputs.weights) return;
+  for (int i = 0; i < 4; ++i) out.weights[4 * row + i] = places.weights[i];
+  if (out.outputs.at == AtTime::contact) out.approach[row] = places.approach;
 }
 
 template <class Arbiter, Kind kind>
@@ -26,8 +29,8 @@ __device__ bool find_places(const PlacesOut& out, const OpenRow& row) {
 // False if they stay open.
 template <class Arbiter>
 __device__ bool find_places(const PlacesTask& task, const OpenRow& row) {
-  return row.row < task.n_vf ? find_places<Arbiter, Kind::vertex_face>(task.out, row)
-                             : find_places<Arbiter, Kind::edge_edge>(task.out, row);
+  return row.row < task.n_rows[0] ? find_places<Arbiter, Kind::vertex_face>(task.out, row)
+                                  : find_places<Arbiter, Kind::edge_edge>(task.out, row);
 }
 
 }  // namespace hpccd::gpu

@@ -90,8 +90,17 @@ void Worker::test_pairs(std::span<const std::uint32_t> first, std::span<const st
   }
 }
 
+void Worker::keep(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule) {
+  auto group = std::ranges::find_if(
+      *kept, [&](const PairGroup& g) { return g.kind == kind && g.rule.number() == rule.number(); });
+  if (group == kept->end()) group = kept->insert(kept->end(), {kind, rule, {}, {}});
+  group->first.insert(group->first.end(), first, first + n);
+  group->second.insert(group->second.end(), second, second + n);
+}
+
 void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule) {
   heed_cancellation();
+  if (kept) keep(first, second, n, kind, rule);
   std::vector<Contact>& list = found(kind);
   constexpr std::size_t many = 1 << 16;
   if (list.capacity() - list.size() < n && list.size() >= many) grow(list, *search_->cancellation);

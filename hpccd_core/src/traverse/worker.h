@@ -22,6 +22,13 @@ class PairSink {
   virtual void flush() = 0;  // no more pairs for now
 };
 
+// Pairs of one kind that are tested by one rule.
+struct PairGroup {
+  Kind kind;
+  Rule rule;
+  std::vector<std::uint32_t> first, second;
+};
+
 // If contacts bound the search, early ones matter most: the first batches are small.
 inline constexpr std::uint32_t first_batch = 64, first_batches = 32;
 
@@ -69,10 +76,11 @@ class alignas(128) Worker {
   FallbackCounts fallbacks[3];
   std::uint64_t node_pairs = 0, leaf_pairs = 0;
   double elementary_seconds = 0;
-  std::uint64_t elementary_ticks = 0;  // the same time, for the share of the k-DOP filter in it
-  SampledTime leaf_pairs_time;         // without the tests of the candidates
-  PairSink* sink = nullptr;            // for pairs of leaves that are tested elsewhere
-  std::size_t best_task = 0;           // for report "any": the task of these contacts
+  std::uint64_t elementary_ticks = 0;      // the same time, for the share of the k-DOP filter in it
+  SampledTime leaf_pairs_time;             // without the tests of the candidates
+  PairSink* sink = nullptr;                // for pairs of leaves that are tested elsewhere
+  std::vector<PairGroup>* kept = nullptr;  // candidates that will be tested again
+  std::size_t best_task = 0;               // for report "any": the task of these contacts
 
  private:
   struct Waiting {
@@ -87,6 +95,7 @@ class alignas(128) Worker {
     return grows_batches_ ? growing_batch_ : first_batches_ > 0 ? first_batch : batch_capacity;
   }
   void drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t keep_below);
+  void keep(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule);
   void test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule);
   const Geometry& geometry_of(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind);
   std::vector<Contact>& found(Kind kind);

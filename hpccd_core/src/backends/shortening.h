@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// Shortens the motions of vertices until no pair of features touches: the factors, and the ends that they give.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "base/parallel.h"
+#include "elementary/motion.h"
+#include "hpccd/hpccd.h"
+#include "scene/features.h"
+
+namespace hpccd {
+
+// Each round takes the pairs that touch in the motion as it is now. Their vertices keep 0.9 of what plain shortening
+// leaves, but not less than `floor`, at which all vertices alike would touch nothing. So every vertex keeps at least
+// the part that a step of one length for all would give it, and pairs at that length are free of each other; only a
+// pair whose rounded ends touch goes below.
+class Shortening {
+ public:
+  // Host positions of one world. groups: by vertex, -1 or a number; vertices with the same number share a factor.
+  Shortening(Positions t0, Positions t1, std::span<const std::int64_t> groups);
+
+  struct Touching {
+    std::uint32_t vertices[4];
+    double toc;
+  };
+  // The vertices whose ends have changed, and with them end(). None: nothing touches but what touches at the start.
+  std::span<const std::uint32_t> shorten(std::span<const Touching> pairs);
+  Positions end() const;
+  CollisionFreeMotion result() &&;
+
+ private:
+  double& factor(std::uint32_t vertex) { return factors_[slots_.empty() ? vertex : slots_[vertex]]; }
+  void move(std::uint32_t vertex);
+  void take(const Touching& pair, double part);
+
+  const Positions t0_, t1_;
+  std::vector<double> ends_;
+  std::vector<float> float_ends_;     // for positions in floats
+  std::vector<std::uint32_t> slots_;  // by vertex, of its factor; empty: its own number
+  std::vector<double> factors_, next_;
+  std::vector<char> moves_, stuck_;
+  std::vector<std::uint32_t> changed_;
+  double floor_ = -1;
+  int round_ = 0;
+};
+
+// Which features have one of some vertices.
+class ChangedFeatures {
+ public:
+  explicit ChangedFeatures(const Features& features)
+      : features_(features),
+        vertices_(features.n_vertices),
+        edges_(features.edges.size()),
+        faces_(features.faces.size()) {}
+  void set(std::span<const std::uint32_t> vertices, ThreadPool& pool);
+  // By number, of the first and of the second features of pairs.
+  std::pair<const char*, const char*> of(Kind kind) const {
+    return kind == Kind::vertex_face ? std::pair(vertices_.data(), faces_.data())
+                                     : std::pair(edges_.data(), edges_.data());
+  }
+
+ private:
+  const Features& features_;
+  std::vector<char> vertices_, edges_, faces_;
+};
+
+}  // namespace hpccd

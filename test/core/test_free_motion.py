@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: Apache-2.0
+"""collision_free_motion: nothing touches in it, and no vertex keeps less than a step of one length would leave it."""
+
+import numpy as np
+import pytest
+import random_scenes
+
+import hpccd_core as hc
+
+SCENES = pytest.mark.parametrize("generate", random_scenes.ALL)
+
+
+def detector_of(meshes, **options):
+    return hc.Detector(meshes.scene(), **({"backend": "cpu", "threads": 2} | options))
+
+
+def vertices_of(found, meshes):
+    before = np.cumsum([0, *meshes.n_vertices[:-1]])
+    faces = np.concatenate([np.reshape(f, (-1, 3)) + b for f, b in zip(meshes.faces, before, strict=True)])
+    return np.concatenate([np.concatenate([found.vf[:, :1], faces[found.vf[:, 1]]], 1), found.ee]).astype(int)
+
+
+def assert_free(meshes, motion, detector, start, end):
+    """All that the documentation promises. Returns the factors."""
+    assert motion.vertices.dtype == start.dtype and motion.vertices.shape == start.shape
+    assert motion.factors.dtype == np.float64 and ((motion.factors >= 0) & (motion.factors <= 1)).all()
+    left = detector.detect(start, motion.vertices)
+    touching = vertices_of(left, meshes)
+    assert np.isin(touching, motion.stuck).all() and not np.concatenate([left.vf_toc, left.ee_toc]).any()
+    assert (motion.factors[motion.stuck] == 0).all() and np.array_equal(motion.stuck, np.unique(motion.stuck))
+    at_start = detector.detect(start, start)
+    assert np.array_equal(np.unique(vertices_of(at_start, meshes)), motion.stuck)
+    kept = motion.factors == 1
+    assert np.array_equal(motion.vertices[kept], end[kept])
+    assert np.array_equal(motion.vertices[motion.factors == 0], start[motion.factors == 0])
+    exact = start + motion.factors[:, None] * (end.astype(float) - start)
+    roundings = np.finfo(start.dtype).eps * np.maximum(np.abs(start), np.abs(end)).max(initial=0)
+    assert np.abs(motion.vertices - exact).max(initial=0) <= 2 * roundings
+    assert (motion.factors[(start == end).all(1) & ~np.isin(np.arange(len(start)), motion.stuck)] == 1).all()
+    return motion.factors
+
+
+@SCENES
+@pytest.mark.parametrize("options", [{}, {"minimum_separation": 0.03125}, {"accuracy": "conservative"}], ids=str)
+def test_nothing_touches(generate, options):
+    for seed in range(4):
+        meshes = generate(np.random.default_rng([45, seed]))
+        start, end = meshes.vertices_t0, meshes.vertices_t1
+        detector = detector_of(meshes, **options)
+        motion = detector.collision_free_motion(start, end)
+        factors = assert_free(meshes, motion, detector, start, end)
+        step = detector.collision_free_step(start, end)
+        moved = (start != end).any(1)
+        assert factors[moved].min(initial=1) >= 0.9 * step * (1 - 1e-9)
+        for other in ({"threads": 1, "simd": "scalar"}, {"report": "any"}, {"method": "published"}):
+            assert detector_of(meshes, **options, **other).collision_free_motion(start, end) == motion
+
+
+@SCENES
+def test_free_starts(generate):
+    """Scenes that are apart at first: nothing is stuck."""
+    for seed in range(4):
+        meshes = generate(np.random.default_rng([46, seed]))
+        rest = np.arange(len(meshes.vertices_t0))[:, None] * np.array([1, 0, 0]) * 4.0 * np.ptp(meshes.vertices_t0)
+        detector = detector_of(meshes)
+        motion = detector.collision_free_motion(meshes.vertices_t0 + rest, meshes.vertices_t1)
+        factors = assert_free(meshes, motion, detector, meshes.vertices_t0 + rest, meshes.vertices_t1)
+        step = detector.collision_free_step(meshes.vertices_t0 + rest, meshes.vertices_t1)
+        if step > 0:
+            assert not len(motion.stuck) and factors.min() >= 0.9 * step * (1 - 1e-9)
+
+
+def flat_sheet(n):
+    x, y = np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, n), indexing="ij")
+    return np.stack([x, y, 0 * x], -1).reshape(-1, 3)
+
+
+def stack(n_sheets=5, n=12, gap=0.05):
+    """Sheets above each other, of which the uppermost falls fast: each pushes the next."""
+    faces, flat = random_scenes.sheet(n), flat_sheet(n)
+    start = np.concatenate([flat + [0, 0, gap * k] for k in range(n_sheets)])
+    end = start.copy()
+    end[-n * n :, 2] -= 10 * gap
+    sheets = zip(start.reshape(n_sheets, -1, 3), end.reshape(n_sheets, -1, 3), strict=True)
+    return random_scenes.combine(*[(faces, a, b) for a, b in sheets])
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_chain(dtype):
+    meshes = stack()
+    start, end = meshes.vertices_t0.astype(dtype), meshes.vertices_t1.astype(dtype)
+    detector = detector_of(meshes)
+    motion = detector.collision_free_motion(start, end)
+    factors = assert_free(meshes, motion, detector, start, end)
+    assert (factors[:-144] == 1).all() and (np.abs(factors[-144:] - 0.09) < 1e-3).all()
+
+
+def test_far_vertices_keep_all_of_their_motion():
+    """One pair meets at 1e-9 of the step; five edges away the cloth moves freely."""
+    n = 24
+    faces, flat = random_scenes.sheet(n), flat_sheet(n)
+    scene = hc.Scene()
+    scene.add_mesh("cloth", faces)
+    scene.add_mesh("pin", np.empty((0, 3), int), n_vertices=1)
+    middle = n // 2 * n + n // 2
+    start = np.concatenate([flat, [flat[middle] + [1e-3, 1e-3, 1e-9]]])
+    end = start.copy()
+    end[:-1, 2] += 1
+    motion = hc.Detector(scene, backend="cpu").collision_free_motion(start, end)
+    rows, columns = np.divmod(np.arange(n * n), n)
+    away = np.maximum(abs(rows - n // 2), abs(columns - n // 2))
+    assert (motion.factors[:-1][away >= 5] == 1).all()
+    assert motion.factors.min() < 2e-9 and motion.factors.mean() > 0.99
+
+
+def test_groups_share_a_factor():
+    meshes = stack(2, 6)
+    detector = detector_of(meshes)
+    start, end = meshes.vertices_t0, meshes.vertices_t1
+    end[36:40, 2] = start[36:40, 2]  # a part of the upper sheet stays
+    alone = detector.collision_free_motion(start, end).factors
+    groups = np.full(72, -1)
+    groups[40:72] = 7
+    together = detector.collision_free_motion(start, end, groups)
+    assert_free(meshes, together, detector, start, end)
+    assert len(set(together.factors[40:])) == 1 and together.factors[40] <= alone[40:].min()
+    assert (together.factors[:40] == 1).all()
+
+
+def test_worlds_are_computed_one_by_one():
+    rng = np.random.default_rng(3)
+    meshes = random_scenes.many_meshes(rng)
+    ends = np.stack([meshes.vertices_t1 + 0.1 * k for k in range(5)])
+    starts = np.stack([meshes.vertices_t0] * 5)
+    alone = [detector_of(meshes).collision_free_motion(a, b) for a, b in zip(starts, ends, strict=True)]
+    for threads in (1, 3):
+        motion = detector_of(meshes, worlds=5, threads=threads).collision_free_motion(starts, ends)
+        assert motion.vertices.shape == starts.shape and motion.factors.shape == starts.shape[:2]
+        for k, one in enumerate(alone):
+            assert np.array_equal(motion.vertices[k], one.vertices) and np.array_equal(motion.factors[k], one.factors)
+        n = starts.shape[1]
+        assert motion.stuck.tolist() == [k * n + v for k, one in enumerate(alone) for v in one.stuck]
+
+
+def test_beside_other_queries():
+    """The motion has boxes of its own; other queries of the detector do not notice."""
+    meshes = stack()
+    detector, other = detector_of(meshes), detector_of(meshes)
+    start, end = meshes.vertices_t0, meshes.vertices_t1
+    for k in range(4):
+        now = start + 0.001 * k
+        fresh = detector_of(meshes, minimum_separation=0.01 * max(k - 1, 0))
+        assert detector.collision_free_motion(now, end) == fresh.collision_free_motion(now, end)
+        assert detector.detect(now, end) == other.detect(now, end)
+        assert detector.collision_free_step(now, end) == other.collision_free_step(now, end)
+        assert detector.proximity(now, 0.06) == other.proximity(now, 0.06)
+        detector.set_separations(np.full((5, 5), 0.01 * k))
+        other.set_separations(np.full((5, 5), 0.01 * k))
+
+
+@pytest.mark.parametrize(
+    "groups, error, text",
+    [
+        ([0, 1], ValueError, r"groups: expected shape \(72,\), a number for each vertex, got \(2,\)"),
+        (np.zeros(72), TypeError, "groups: expected integers, got float64; -1 is for a vertex on its own"),
+        (np.full(72, -2), ValueError, "groups: numbers from 0, or -1 for a vertex on its own, got -2"),
+        ("arm", TypeError, "groups: expected integers"),
+    ],
+)
+def test_wrong_groups(groups, error, text):
+    meshes = stack(2, 6)
+    with pytest.raises(error, match=text):
+        detector_of(meshes).collision_free_motion(meshes.vertices_t0, meshes.vertices_t1, groups)
+
+
+def test_wrong_positions_and_cancelled():
+    meshes = stack(2, 6)
+    detector, end = detector_of(meshes), meshes.vertices_t1.copy()
+    end[3, 1] = np.nan
+    with pytest.raises(ValueError, match=r"vertices_t1\[3, 1\] is NaN"):
+        detector.collision_free_motion(meshes.vertices_t0, end)
+    detector.cancel()
+    with pytest.raises(hc.Cancelled):
+        detector.collision_free_motion(meshes.vertices_t0, meshes.vertices_t1)
+
+
+def test_no_vertices_and_nothing_in_the_way():
+    nothing = np.empty((0, 3))
+    empty = hc.Detector(hc.Scene(), backend="cpu").collision_free_motion(nothing, nothing)
+    assert empty.vertices.shape == (0, 3)
+    assert repr(empty) == "CollisionFreeMotion(0 vertices, mean factor none, 0 stuck)"
+    meshes = stack(2, 6)
+    free = detector_of(meshes).collision_free_motion(meshes.vertices_t0, meshes.vertices_t0 + 1)
+    assert (free.factors == 1).all() and repr(free) == "CollisionFreeMotion(72 vertices, mean factor 1, 0 stuck)"
