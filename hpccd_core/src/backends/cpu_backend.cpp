@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <utility>
 
 #include "contacts/gaps.h"
@@ -302,80 +301,56 @@ std::optional<std::vector<double>> CpuBackend::earliest(Positions t0, Positions 
   return std::vector<double>{search_->earliest};
 }
 
-// The features of a motion that is shortened stay within boxes of their whole way: later rounds only test the
-// candidates of one search by such boxes again, as far as their vertices have changed. A search of the rounded numbers
-// from the start is the proof.
+// The features of a motion that is shortened stay within bounds of their whole way. So one search by such bounds has
+// all candidates of each shorter motion, and a round only tests those again whose vertices have changed. A search of
+// the rounded numbers from the start is the proof.
 
 std::optional<CollisionFreeMotion> CpuBackend::free_motion(Positions t0, Positions t1,
                                                            std::span<const std::int64_t> groups) {
   Shortening motion(t0, t1, groups);
-  if (!whole_) whole_ = std::make_unique<MovingTree>(*shared_.scene, shared_.features, shared_.pool, true);
-  for (;;) {
+  while (shorten_to_rest(t0, motion)) {
     begin_motion(t0, motion.end(), Tests::all_here);
     search_->report = Report::all, counts_.earliest = false;
     shared_.tree.fit(shared_.profiler);
     walk_tree(*search_);
     if (motion.shorten(touching()).empty()) break;
-    shorten_to_rest(t0, motion);
   }
   shared_.cancellation.heed();
   return std::move(motion).result();
 }
 
-// Until no candidate touches.
-void CpuBackend::shorten_to_rest(Positions t0, Shortening& motion) {
-  const std::vector<PairGroup> candidates = search_whole_way(t0, motion.end());
-  ChangedFeatures changed(shared_.features);
-  for (;;) {
-    const std::span<const std::uint32_t> vertices = motion.shorten(touching());
-    if (vertices.empty()) return;
-    whole_->shorten(t0, motion.end(), vertices);
+// Until no candidate touches. False if none did.
+bool CpuBackend::shorten_to_rest(Positions t0, Shortening& motion) {
+  search_whole_ways(t0, motion.end());
+  std::span<const std::uint32_t> vertices = motion.shorten(touching());
+  const bool shortened = !vertices.empty();
+  for (; !vertices.empty(); vertices = motion.shorten(touching())) {
+    whole_->tree.shorten(t0, motion.end(), vertices);
     shared_.profiler.mark("bounds");
-    changed.set(vertices, shared_.pool);
-    test_changed(candidates, changed);
+    for (Worker& w : workers_) w.begin(*search_);
+    whole_->pairs.for_each(vertices, shared_.pool, [&](const PairGroup& group, auto first, auto second, int thread) {
+      workers_[static_cast<std::size_t>(thread)].test_pairs(first, second, group.kind, group.rule);
+    });
     mark_traversal();
   }
+  return shortened;
 }
 
-// Leaves all contacts in the workers, and returns the candidates.
-std::vector<PairGroup> CpuBackend::search_whole_way(Positions t0, Positions t1) {
-  begin_motion(t0, t1, Tests::all_here, *whole_);
+// Leaves all contacts in the workers, and keeps the candidates.
+void CpuBackend::search_whole_ways(Positions t0, Positions t1) {
+  if (!whole_) whole_ = std::make_unique<WholeWays>(*shared_.scene, shared_.features, shared_.pool);
+  begin_motion(t0, t1, Tests::all_here, whole_->tree);
   search_->report = Report::all, counts_.earliest = false;
-  whole_->fit(shared_.profiler);
-  std::vector<std::vector<PairGroup>> kept(workers_.size());
+  whole_->tree.fit(shared_.profiler);
   struct Release {
     std::vector<Worker>& workers;
     ~Release() {
       for (Worker& w : workers) w.kept = nullptr;
     }
   } release{workers_};
-  for (std::size_t i = 0; i < workers_.size(); ++i) workers_[i].kept = &kept[i];
+  std::vector<std::vector<PairGroup>>& lists = whole_->pairs.empty_lists(workers_.size());
+  for (std::size_t i = 0; i < workers_.size(); ++i) workers_[i].kept = &lists[i];
   walk_tree(*search_);
-  std::vector<PairGroup> all;
-  for (auto& of_worker : kept) std::ranges::move(of_worker, std::back_inserter(all));
-  return all;
-}
-
-// Leaves the contacts in the workers.
-void CpuBackend::test_changed(const std::vector<PairGroup>& candidates, const ChangedFeatures& changed) {
-  for (Worker& w : workers_) w.begin(*search_);
-  for (const PairGroup& group : candidates) {
-    const auto& [of_first, of_second] = changed.of(group.kind);
-    parallel_for(
-        shared_.pool, group.first.size(), 4 * batch_capacity, [&](std::size_t begin, std::size_t end, int thread) {
-          std::uint32_t first[batch_capacity], second[batch_capacity], n = 0;
-          const auto test = [&] {
-            workers_[static_cast<std::size_t>(thread)].test_pairs({first, n}, {second, n}, group.kind, group.rule);
-            n = 0;
-          };
-          for (std::size_t i = begin; i < end; ++i) {
-            first[n] = group.first[i], second[n] = group.second[i];
-            n += of_first[first[n]] | of_second[second[n]];
-            if (n == batch_capacity) test();
-          }
-          test();
-        });
-  }
 }
 
 std::span<const Shortening::Touching> CpuBackend::touching() {

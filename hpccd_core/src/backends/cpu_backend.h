@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "backends/backend.h"
+#include "backends/changed_pairs.h"
 #include "backends/near_list.h"
 #include "backends/resources.h"
 #include "backends/shortening.h"
@@ -65,9 +66,8 @@ class CpuBackend final : public DetectionBackend {
   void update_drift();
   std::optional<std::vector<LeafPair>> open_pairs();
   void remember_earliest();
-  void shorten_to_rest(Positions t0, Shortening& motion);
-  std::vector<PairGroup> search_whole_way(Positions t0, Positions t1);
-  void test_changed(const std::vector<PairGroup>& candidates, const ChangedFeatures& changed);
+  bool shorten_to_rest(Positions t0, Shortening& motion);
+  void search_whole_ways(Positions t0, Positions t1);
   std::span<const Shortening::Touching> touching();
   void begin_motion(Positions t0, Positions t1, Tests tests);
   void begin_motion(Positions t0, Positions t1, Tests tests, MovingTree& tree);
@@ -91,8 +91,14 @@ class CpuBackend final : public DetectionBackend {
   NearList near_;  // for the earliest contacts of motions that begin alike
   Drift drift_;    // of the snapshot of the list
   Travel travel_;  // of the motion, relative to the list
-  std::unique_ptr<MovingTree>
-      whole_;  // by boxes of the whole way, for motions that are shortened; created by the first
+  // For motions that are shortened; created by the first.
+  struct WholeWays {
+    WholeWays(const Scene& scene, const Features& features, ThreadPool& pool)
+        : tree(scene, features, pool, true), pairs(features) {}
+    MovingTree tree;  // by bounds of whole ways
+    ChangedPairs pairs;
+  };
+  std::unique_ptr<WholeWays> whole_;
   std::vector<Shortening::Touching> touching_;
   std::optional<MeshPairs> mesh_pairs_;  // created by the first search for smallest distances
   // The start of the drift: the numbers of that snapshot and of the tree.

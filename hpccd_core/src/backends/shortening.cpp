@@ -96,21 +96,6 @@ std::span<const std::uint32_t> Shortening::shorten(std::span<const Touching> pai
   return changed_;
 }
 
-void ChangedFeatures::set(std::span<const std::uint32_t> vertices, ThreadPool& pool) {
-  std::ranges::fill(vertices_, 0);
-  for (const std::uint32_t v : vertices) vertices_[v] = 1;
-  const auto mark = [&](std::vector<char>& marks, const auto& features) {
-    parallel_for(pool, marks.size(), 8192, [&](std::size_t begin, std::size_t end, int) {
-      for (std::size_t i = begin; i < end; ++i) {
-        char any = 0;
-        for (const std::uint32_t v : features[i]) any |= vertices_[v];
-        marks[i] = any;
-      }
-    });
-  };
-  mark(edges_, features_.edges), mark(faces_, features_.faces);
-}
-
 CollisionFreeMotion Shortening::result() && {
   CollisionFreeMotion motion;
   motion.vertices = t0_.is_double ? std::move(ends_) : std::vector<double>(float_ends_.begin(), float_ends_.end());

@@ -4,13 +4,9 @@
 
 #include <cstdint>
 #include <span>
-#include <utility>
 #include <vector>
 
-#include "base/parallel.h"
-#include "elementary/motion.h"
 #include "hpccd/hpccd.h"
-#include "scene/features.h"
 
 namespace hpccd {
 
@@ -46,26 +42,6 @@ class Shortening {
   std::vector<std::uint32_t> changed_;
   double floor_ = -1;
   int round_ = 0;
-};
-
-// Which features have one of some vertices.
-class ChangedFeatures {
- public:
-  explicit ChangedFeatures(const Features& features)
-      : features_(features),
-        vertices_(features.n_vertices),
-        edges_(features.edges.size()),
-        faces_(features.faces.size()) {}
-  void set(std::span<const std::uint32_t> vertices, ThreadPool& pool);
-  // By number, of the first and of the second features of pairs.
-  std::pair<const char*, const char*> of(Kind kind) const {
-    return kind == Kind::vertex_face ? std::pair(vertices_.data(), faces_.data())
-                                     : std::pair(edges_.data(), edges_.data());
-  }
-
- private:
-  const Features& features_;
-  std::vector<char> vertices_, edges_, faces_;
 };
 
 }  // namespace hpccd

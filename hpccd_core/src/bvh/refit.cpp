@@ -93,6 +93,14 @@ void grow(Kdop& kdop, const KdopMargin& by) {
   for (int k = 0; k < 2 * n_kdop_directions; ++k) kdop.low[k] -= by.in[k], kdop.high[k] += by.in[k];
 }
 
+// As MotionBounds::of_any_part says of boxes.
+void contain_start(Kdop& kdop) {
+  for (int t0 = 0; t0 < n_kdop_directions; ++t0) {
+    const int t1 = t0 + n_kdop_directions;
+    kdop.low[t1] = std::min(kdop.low[t0], kdop.low[t1]), kdop.high[t1] = std::max(kdop.high[t0], kdop.high[t1]);
+  }
+}
+
 void join_kdops(Tree& tree, const LeafRange& leaf, const std::vector<VertexKdop>& vertex_kdops) {
   constexpr int parts = 4;
   static_assert(sizeof(VertexKdop) == parts * sizeof(Floats4));
@@ -113,6 +121,7 @@ void fit_leaf(Tree& tree, std::uint32_t number, const MotionBounds& motion) {
   Node& node = tree.nodes[tree.leaf_nodes[number]];
   node.box = leaf_bounds(tree, leaf, motion.boxes);
   if (tree.by_kdops) join_kdops(tree, leaf, motion.kdops);
+  if (tree.by_kdops && motion.of_any_part) contain_start(tree.kdops[number]);
   if (tree.by_kdops && motion.grown) grow(tree.kdops[number], margin_of(motion, node.mesh));
   Block& block = tree.blocks[tree.block_of_leaf[number]];
   float bounds[n_bounds];
