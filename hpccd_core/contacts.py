@@ -15,6 +15,19 @@ from .results import OUTPUT_ARRAYS, WithSides, output
 from .worlds import PairsOfWorlds, Slices
 
 
+def toc_gradients(
+    toc: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    approach: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What `Contacts.toc_gradients` returns, of arrays with one row for each contact."""
+    arms = weights[:, :, None] * normals[:, None, :]
+    per_approach = np.full(len(toc), np.nan)
+    np.divide(-1, approach, out=per_approach, where=(toc > 0) & (approach != 0))
+    return ((1 - toc) * per_approach)[:, None, None] * arms, (toc * per_approach)[:, None, None] * arms
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Contacts(WithSides, PairsOfWorlds):
     """Contacts of one step in canonical order: N vertex-face rows, then M edge-edge rows.
@@ -175,11 +188,8 @@ class Contacts(WithSides, PairsOfWorlds):
         >>> g0[0, 0].tolist(), g1[0, 0].tolist()  # the vertex
         ([0.0, 0.0, 0.25], [0.0, 0.0, 0.25])
         """
-        arms = self.weights[:, :, None] * self.normals[:, None, :]
-        toc, approach = np.concatenate([self.vf_toc, self.ee_toc]), self.approach
-        per_approach = np.full(len(self), np.nan)
-        np.divide(-1, approach, out=per_approach, where=(toc > 0) & (approach != 0))
-        return ((1 - toc) * per_approach)[:, None, None] * arms, (toc * per_approach)[:, None, None] * arms
+        toc = np.concatenate([self.vf_toc, self.ee_toc])
+        return toc_gradients(toc, self.weights, self.normals, self.approach)
 
     @property
     def first_tocs(self) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ import numpy as np
 from hpccd.msg import ContactArray, PairSummary, PairSummaryArray
 from numpy.typing import DTypeLike, NDArray
 
+from hpccd_core.contacts import toc_gradients
 from hpccd_core.results import OUTPUT_ARRAYS
 from hpccd_ros.client.names import belongs, check
 from hpccd_ros.detect.layout import Layout
@@ -40,7 +41,8 @@ class ContactArrays:
     """The N contacts of one message in canonical order; features are numbered within their mesh.
 
     All arrays are views of the message. Outputs from `points` to `approach` have no rows if the node does not send them
-    (its parameter ``outputs``; "weights" stands for the last three).
+    (its parameter ``outputs``; ``weights`` asks for the last three). Responses about one snapshot
+    have no `approach`.
 
     Attributes
     ----------
@@ -63,11 +65,12 @@ class ContactArrays:
     closest : ndarray, shape (N, 2, 3), float64
         Nearest points of both sides at their time of impact, in the unit of the scene.
     vertices : ndarray, shape (N, 4), uint32
-        v of `mesh_a` and f0 f1 f2 of `mesh_b`, or a0 a1 of `mesh_a` and b0 b1 of `mesh_b`.
+        Vertices of each contact within their mesh: v of `mesh_a` and f0 f1 f2 of `mesh_b`, or a0 a1 of `mesh_a` and b0
+        b1 of `mesh_b`.
     weights : ndarray, shape (N, 4), float64
         Weights of `vertices`, as in ``hpccd_core.Contacts``.
     approach : ndarray, shape (N,), float64
-        How fast the gap grows at the time of impact, as in ``hpccd_core.Contacts``.
+        How fast the gap grows at the time of impact, as in ``hpccd_core.Contacts``; negative while the sides approach.
     distance : ndarray, shape (N,), float64
         Distance of the sides, in the unit of the scene, in responses to the query ``proximity``; otherwise (0,).
     minimum_separation : float
@@ -106,6 +109,31 @@ class ContactArrays:
 
     def __len__(self) -> int:
         return len(self.mesh_a)
+
+    def toc_gradients(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Derivatives of `toc` with respect to the positions at both ends of the step.
+
+        Returns
+        -------
+        g0, g1 : ndarray, shape (N, 4, 3), float64
+            As of ``hpccd_core.Contacts.toc_gradients``: with respect to the positions of `vertices` at the start of the
+            step and at its end.
+
+        Raises
+        ------
+        ValueError
+            If the node does not send `normals`, `weights` and `approach`, or if it cut the step into several parts, in
+            which vertices do not move straight from start to end.
+        """
+        for name in ("normals", "weights", "approach"):
+            if len(getattr(self, name)) != len(self):
+                asked = "set the node's parameter outputs to [normals, weights]"
+                raise ValueError(f"toc_gradients: the message has no {name}; {asked}")
+        if self.parts > 1:
+            raise ValueError(
+                f"toc_gradients: the step was computed in {self.parts} parts; with rigid_parts: 1 it has gradients"
+            )
+        return toc_gradients(self.toc, self.weights, self.normals, self.approach)
 
 
 # Fields that may be empty; shape of what they hold for each contact, and type.
@@ -180,9 +208,8 @@ def scene_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
     -------
     SceneContacts
         ``vf`` (N, 2), ``vf_toc`` (N,), ``ee`` (M, 4), ``ee_toc`` (M,), ``points``, ``normals``, ``closest``,
-        ``vertices``, ``weights`` and ``approach``.
-        Responses to ``proximity`` have ``vf_distance`` and ``ee_distance`` instead of times, those to
-        ``intersections`` only ``ef`` (K, 3).
+        ``vertices``, ``weights`` and ``approach``. Responses to ``proximity`` have ``vf_distance`` and ``ee_distance``
+        instead of times, those to ``intersections`` only ``ef`` (K, 3).
 
     Raises
     ------

@@ -168,7 +168,7 @@ class SceneContacts:
 
 def _scene_wide_vertices(message: ContactArray, layout: Layout) -> NDArray[np.uint32]:
     vertices = np.frombuffer(message.vertices, np.uint32).reshape(-1, 4)
-    return vertices if not len(vertices) else (vertices + _first_vertices(message, layout)).astype(np.uint32)
+    return (vertices + _first_vertices(message, layout)).astype(np.uint32) if len(vertices) else vertices
 
 
 def other_topologies(message: ContactArray, layout: Layout) -> str | None:
@@ -180,8 +180,7 @@ def other_topologies(message: ContactArray, layout: Layout) -> str | None:
 
 
 def read_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
-    """The inverse of fill_contacts (what was cut off stays cut off). points, normals: (N,3) or (0,3); closest: (N,2,3)
-    or (0,2,3).
+    """The inverse of fill_contacts (what was cut off stays cut off). Outputs have as many rows as contacts, or none.
 
     Raises ValueError where the message belongs to other versions of the topologies than the layout.
     """

@@ -19,9 +19,10 @@ def difference(
     """None if `recorded` (ContactArray) is the message that the node would send for `contacts` (of the core) and
     `bounds`.
 
-    Pairs, times, their order, totals, first time and hash must be bit-identical. Outputs (points and so on) are derived
-    from these and not compared. any_one: the node stopped at the first contact found (report "any"), which
-    depends on the timing of its threads: there must be one if there is any, and it must be one of all `contacts`.
+    Pairs, times, their order, totals, first time, hash and the outputs that `recorded` has must be bit-identical;
+    `contacts` must have these outputs. any_one: the node stopped at the first contact found (report "any"), which
+    depends on the timing of its threads: there must be one if there is any, and it must be one of all `contacts`;
+    outputs are not compared.
     """
     total = len(contacts.vf) + len(contacts.ee)
     then, now = list(recorded.topology_versions), list(layout.topology_versions)
@@ -36,7 +37,7 @@ def difference(
     count = len(recorded.kind)
     expected = type(recorded)()
     sent = count if recorded.truncated else 0
-    contact_messages.fill_contacts(expected, contacts, layout, max_contacts=sent, outputs=())
+    contact_messages.fill_contacts(expected, contacts, layout, max_contacts=sent)
     then, now = contact_messages.read_contacts(recorded, layout), contact_messages.read_contacts(expected, layout)
     for kind, describe in (("vf", _vertex_face), ("ee", _edge_edge)):
         first = _first_difference(
@@ -53,7 +54,29 @@ def difference(
     if recorded.hash != contacts.hash:
         where = "among the contacts that were cut off" if recorded.truncated else "although all contacts are equal"
         return f"hash {recorded.hash:#018x} was recorded, now it is {contacts.hash:#018x}, {where}"
-    return None
+    return next(filter(None, (_other_output(name, recorded, expected) for name in _recorded_arrays(recorded))), None)
+
+
+def recorded_outputs(recorded) -> set[str]:
+    """The values of parameter ``outputs`` that ask for the outputs in the message."""
+    return {OUTPUT_ARRAYS[name].asked for name in _recorded_arrays(recorded)}
+
+
+def _recorded_arrays(recorded) -> list[str]:
+    return [name for name in OUTPUT_ARRAYS if len(getattr(recorded, name))]
+
+
+def _other_output(name, recorded, expected) -> str | None:
+    array = OUTPUT_ARRAYS[name]
+    then, now = (
+        np.frombuffer(getattr(message, name), array.dtype).reshape(len(recorded.kind), -1)
+        for message in (recorded, expected)
+    )
+    unequal = (then.view(np.uint8) != now.view(np.uint8)).any(axis=1)
+    if not unequal.any():
+        return None
+    row = int(np.argmax(unequal))
+    return f"{name} of contact {row}: {then[row].tolist()} was recorded, now it is {now[row].tolist()}"
 
 
 def _bounded(bounds: MotionBounds) -> str:
@@ -79,9 +102,9 @@ def _malformed(message, layout) -> str | None:
         return f"its accuracy is {message.accuracy[:20]!r}, none of {', '.join(ACCURACIES)}"
     if list(message.mesh_names) != list(layout.mesh_names):
         return f"its meshes are {list(message.mesh_names)}, those of the recording {list(layout.mesh_names)}"
-    for name, per_contact in {name: math.prod(array.row) for name, array in OUTPUT_ARRAYS.items()}.items():
-        if len(getattr(message, name)) not in (0, per_contact * count):
-            return f"{name} has {len(getattr(message, name))} coordinates for {count} contacts"
+    for name, array in OUTPUT_ARRAYS.items():
+        if len(getattr(message, name)) not in (0, math.prod(array.row) * count):
+            return f"{name} has {len(getattr(message, name))} entries for {count} contacts"
     if len(message.distance):
         return f"distance has {len(message.distance)} entries; contacts of a step have none"
     kind = np.frombuffer(message.kind, np.uint8)

@@ -5,7 +5,7 @@ import dataclasses
 from collections import Counter, deque
 from collections.abc import Iterator
 
-from hpccd_core.options import ACCURACIES, FEATURES
+from hpccd_core.options import ACCURACIES, FEATURES, OUTPUTS
 from hpccd_ros.bag.decode import make_decoder
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.detect.core import CORE_ERRORS
@@ -19,7 +19,7 @@ from hpccd_ros.middleware import fields
 from hpccd_ros.middleware.fields import InvalidMessageError
 from hpccd_ros.middleware.result_fields import read_features, read_inputs, read_report, read_separation
 from hpccd_ros.params.table import MOST_PARTS
-from hpccd_ros.replay.compare import difference
+from hpccd_ros.replay.compare import difference, recorded_outputs
 from hpccd_ros.replay.distances import DistanceCheck
 from hpccd_ros.replay.frames import PATIENCE, FrameSource, FrameWindow
 from hpccd_ros.replay.input_order import InputOrder, OrderedResult
@@ -134,7 +134,7 @@ class Replay:
 
     backend, threads: as in hpccd_core.Detector; the contacts must not depend on them.
     accuracy, features: empty: those of each result. The separation is always that of the result.
-    outputs: computed in addition to the contacts, not compared.
+    outputs: computed in addition to those that the results have, which are compared.
     distances: whether to check the results on the topic distances too.
     begin, end: seconds into the recording; steps outside are neither computed nor counted.
     messages_read: recorded messages so far, of `message_count`.
@@ -158,7 +158,7 @@ class Replay:
         self._setup = setup
         self._backend, self._threads, self._accuracy = backend, threads, accuracy
         self._features = tuple(features)
-        self._outputs = tuple(outputs)
+        self._outputs = set(outputs)  # and of the results so far: a change makes a new detector
         self._begin, self._end = begin, end
         self._at = 0.0  # seconds into the recording, of the message read last
         self.messages_read = 0
@@ -346,9 +346,10 @@ class Replay:
             # In the same number of parts: the tolerance may have been different.
             rigid = dataclasses.replace(options.rigid, parts=min(recorded.parts, MOST_PARTS))
             options = dataclasses.replace(options, separation=separation, features=features, rigid=rigid)
+            self._outputs |= recorded_outputs(recorded)
         if self._features:
             options = dataclasses.replace(options, features=self._features)
-        return dataclasses.replace(options, outputs=self._outputs)
+        return dataclasses.replace(options, outputs=tuple(name for name in OUTPUTS if name in self._outputs))
 
     def _separation_of(self, recorded) -> Separation:
         if list(recorded.mesh_names) != self._mesh_names:

@@ -83,7 +83,7 @@ def test_an_entry_that_is_not_used(with_change):
 
 @pytest.mark.parametrize("name", ["points", "normals"])
 def test_points_of_another_number(with_change, name):
-    _diverges(with_change(lambda put, result: put(name, np.zeros(4))), f"malformed: {name} has 4 coordinates for")
+    _diverges(with_change(lambda put, result: put(name, np.zeros(4))), f"malformed: {name} has 4 entries for")
 
 
 def test_marked_as_cut_off_though_it_is_whole(with_change):

@@ -151,7 +151,7 @@ def test_the_command_tells_the_separations(near_bag, tmp_path, hpccd):
         ({"minimum_separation": -1.0}, "malformed: separation: a separation must be finite and not negative"),
         ({"separations": [0.5]}, "malformed: separation_mesh_a, separation_mesh_b and separations have 0, 0 and 1"),
         ({"distance": [0.5]}, "malformed: distance has 1 entries; contacts of a step have none"),
-        ({"closest": [0.5]}, "malformed: closest has 1 coordinates"),
+        ({"closest": [0.5]}, "malformed: closest has 1 entries"),
     ],
 )
 def test_a_result_with_another_separation_diverges(changed, changes, says):
