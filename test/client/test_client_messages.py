@@ -133,6 +133,48 @@ def test_contacts_with_a_separation():
     assert (plain.minimum_separation, plain.pair_separation, plain.closest.shape) == (0.0, {}, (0, 2, 3))
 
 
+def with_weights(**changes):
+    """Of both contacts; the edges only graze each other."""
+    fields = dict(
+        normals=[0.0, 0.0, 1.0, 0.0, 1.0, 0.0],
+        vertices=[2, 0, 1, 2, 0, 1, 1, 2],
+        weights=[1.0, -0.25, -0.25, -0.5, -0.75, -0.25, 0.5, 0.5],
+        approach=[-2.0, 0.0],
+    )
+    return two_contacts(**{**fields, **changes})
+
+
+def test_weights_and_gradients():
+    contacts = client.contacts_from_message(with_weights())
+    assert contacts.vertices.tolist() == [[2, 0, 1, 2], [0, 1, 1, 2]] and contacts.vertices.dtype == np.uint32
+    assert contacts.weights.tolist() == [[1.0, -0.25, -0.25, -0.5], [-0.75, -0.25, 0.5, 0.5]]
+    assert contacts.approach.tolist() == [-2.0, 0.0]
+    scene = client.scene_contacts(with_weights(), layout("a", "b"))
+    assert scene.vertices.tolist() == [[2, 3, 4, 5], [0, 1, 4, 5]] and scene.vertices.dtype == np.uint32
+    assert np.array_equal(scene.weights, contacts.weights) and np.array_equal(scene.approach, contacts.approach)
+    g0, g1 = contacts.toc_gradients()
+    assert g0.shape == g1.shape == (2, 4, 3) and np.isnan([g0[1], g1[1]]).all()
+    assert g0[0].tolist() == [[0, 0, weight * 0.375] for weight in contacts.weights[0]]
+    assert g1[0].tolist() == [[0, 0, weight * 0.125] for weight in contacts.weights[0]]
+    plain = client.contacts_from_message(two_contacts())
+    assert plain.vertices.shape == plain.weights.shape == (0, 4) and plain.approach.shape == (0,)
+    assert client.scene_contacts(two_contacts(), layout("a", "b")).vertices.shape == (0, 4)
+
+
+@pytest.mark.parametrize(
+    "changes, text",
+    [
+        (dict(normals=[]), r"the message has no normals; set the node's parameter outputs to \[normals, weights\]"),
+        (dict(vertices=[], weights=[], approach=[]), "the message has no weights"),
+        (dict(toc=[], distance=[0.5, 0.25], approach=[]), "the message has no approach"),
+        (dict(parts=2, motion_bounds=[0.0, 0.0]), "the step was computed in 2 parts; with rigid_parts: 1 it has"),
+    ],
+)
+def test_messages_without_gradients(changes, text):
+    with pytest.raises(ValueError, match=f"toc_gradients: {text}"):
+        client.contacts_from_message(with_weights(**changes)).toc_gradients()
+
+
 def test_contacts_tell_what_was_tested():
     assert client.contacts_from_message(two_contacts()).features == ("vertex_face", "edge_edge")
     assert client.contacts_from_message(two_contacts(tested_features=1)).features == ("vertex_face",)
@@ -212,6 +254,9 @@ def test_distances_whose_arrays_do_not_fit_together(changes, text):
         (dict(distance=[0.5, 0.25]), r"toc has 2 values, 0 were expected"),
         (dict(closest=[0.0] * 6), r"closest has 6 values, 12 were expected for shape \(2, 2, 3\)"),
         (dict(points=[0.0]), r"points has 1 values, 6 were expected for shape \(2, 3\)"),
+        (dict(vertices=[0] * 7), r"vertices has 7 values, 8 were expected for shape \(2, 4\)"),
+        (dict(weights=[0.0] * 4), r"weights has 4 values, 8 were expected for shape \(2, 4\)"),
+        (dict(approach=[0.0] * 3), r"approach has 3 values, 2 were expected for shape \(2,\)"),
         (dict(mesh_b=[1, 2]), "mesh_b names a mesh beyond the 2 of mesh_names"),
     ],
 )

@@ -9,6 +9,7 @@ import pytest
 from waving_sheet import sheet_faces, sheet_positions
 
 import hpccd_core as hc
+from hpccd_core.options import OUTPUTS
 from hpccd_core.rigid.body import Body
 from hpccd_core.rigid.screw import Screw
 from hpccd_core.rigid.transform import Rigid
@@ -179,11 +180,14 @@ def test_separations_change_without_a_new_scene_and_results_do_not_depend_on_wha
 
 def test_outputs_and_distances():
     start, end = random_step(np.random.default_rng(3))
-    options = replace(OPTIONS, outputs=("points", "normals", "closest"), distances=True)
+    options = replace(OPTIONS, outputs=OUTPUTS, distances=True)
     found = StepDetector(SceneBuilder(MESHES), options).detect(start, end)
     n = len(found.contacts)
     assert found.contacts.points.shape == found.contacts.normals.shape == (n, 3)
     assert found.contacts.closest.shape == (n, 2, 3)
+    assert found.contacts.vertices.shape == found.contacts.weights.shape == (n, 4)
+    assert found.bounds.parts > 1 and np.allclose(found.contacts.weights.sum(axis=1), 0)
+    assert found.contacts.approach.shape == (n,) and (found.contacts.approach < 0).any()
     assert [(gap.mesh_a, gap.mesh_b) for gap in found.gaps] == [
         ("blade", "cloth"),
         ("blade", "spinner"),

@@ -50,7 +50,7 @@ def message_of(fields):
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_peer_gets_the_contacts_of_the_core(start_node, tmp_path, dtype):
-    n, outputs, apart = 16, ("points", "normals"), 1e-5
+    n, outputs, apart = 16, ("points", "normals", "weights"), 1e-5
     node = start_node({"meshes": ["cloth"], "outputs": list(outputs), "pair_separation": [f"cloth:cloth:{apart}"]})
     frames = np.stack([sheet_positions(n, k, dtype=dtype) for k in range(6)])
     results = play(node, tmp_path, sheet_faces(n), frames)

@@ -14,6 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sensor_msgs.msg import PointCloud2, PointField
 
+import hpccd_core as hc
+from hpccd_core.results import OUTPUT_ARRAYS
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.frames.drops import Reason
 from hpccd_ros.frames.types import Topology
@@ -227,6 +229,11 @@ def test_cloud_that_claims_to_be_huge():
 LAYOUT = Layout(("cloth", "ball", "floor"), np.array([0, 10, 14, 20]), np.array([0, 8, 12, 20]))
 
 
+def _corners(face):
+    """Of a face of the cloth, or else of the ball."""
+    return [5, 0, 9] if face < 8 else [12, 10, 13]
+
+
 def contacts(vf, ee, vf_toc, ee_toc):
     n = len(vf) + len(ee)
     return SimpleNamespace(
@@ -236,6 +243,10 @@ def contacts(vf, ee, vf_toc, ee_toc):
         ee_toc=np.array(ee_toc, np.float64),
         points=np.arange(3.0 * n).reshape(-1, 3),
         normals=-np.arange(3.0 * n).reshape(-1, 3),
+        closest=np.arange(6.0 * n).reshape(-1, 2, 3),
+        vertices=np.array([*([v, *_corners(f)] for v, f in vf), *ee], np.uint32).reshape(-1, 4),
+        weights=np.arange(4.0 * n).reshape(-1, 4),
+        approach=-np.arange(1.0 * n),
         first_toc=min([*vf_toc, *ee_toc], default=math.inf),
         hash=2**64 - 3,
     )
@@ -261,6 +272,8 @@ def test_contacts_in_local_indices():
     assert list(message.mesh_b) == [1, 0, 1, 1, 0, 2]
     assert list(message.features_a) == [3, none, 2, none, 5, none, 1, 2, 4, 5, 1, 2]
     assert list(message.features_b) == [1, none, 0, none, 3, none, 0, 3, 6, 7, 1, 5]
+    within = [[3, 2, 0, 3], [2, 5, 0, 9], [5, 2, 0, 3], [1, 2, 0, 3], [4, 5, 6, 7], [1, 2, 1, 5]]
+    assert np.array_equal(np.array(message.vertices).reshape(-1, 4), within)
     assert (message.first_toc, message.total, message.truncated, message.hash) == (0.0, 6, False, 2**64 - 3)
 
 
@@ -271,7 +284,7 @@ def test_contacts_read_back():
         (SAMPLE, Layout(("all",), np.array([0, 20]), np.array([0, 20]))),
     ]:
         back = contact_messages.read_contacts(filled(found, layout), layout)
-        for name in ("vf", "vf_toc", "ee", "ee_toc", "points", "normals"):
+        for name in ("vf", "vf_toc", "ee", "ee_toc", *OUTPUT_ARRAYS):
             value = getattr(back, name)
             assert np.array_equal(value, getattr(found, name)), name
             assert value.dtype == getattr(found, name).dtype
@@ -299,17 +312,22 @@ def test_truncation_keeps_the_earliest_in_canonical_order(limit):
     toc = np.concatenate([SAMPLE.vf_toc, SAMPLE.ee_toc])
     expected = np.sort(np.argsort(toc, kind="stable")[:limit])
     assert list(message.toc) == toc[expected].tolist()
-    assert np.array_equal(np.frombuffer(message.points).reshape(-1, 3), SAMPLE.points[expected])
     assert message.total == 6 and message.truncated == (limit < 6)
     assert message.first_toc == 0.0 and message.hash == SAMPLE.hash
     back = contact_messages.read_contacts(message, LAYOUT)
+    for name in OUTPUT_ARRAYS:
+        assert np.array_equal(getattr(back, name), getattr(SAMPLE, name)[expected]), name
     assert np.array_equal(back.vf, SAMPLE.vf[expected[expected < 3]])
     assert np.array_equal(back.ee, SAMPLE.ee[expected[expected >= 3] - 3])
 
 
+def sizes_of_outputs(message):
+    return {name: size for name in OUTPUT_ARRAYS if (size := len(getattr(message, name)))}
+
+
 def test_outputs_not_asked_for_are_not_sent():
-    message = filled(SAMPLE, outputs=("normals",))
-    assert len(message.points) == 0 and len(message.normals) == 18
+    assert sizes_of_outputs(filled(SAMPLE, outputs=("normals",))) == {"normals": 18}
+    assert sizes_of_outputs(filled(SAMPLE, outputs=("weights",))) == {"vertices": 24, "weights": 24, "approach": 6}
     nothing = SimpleNamespace(**{**vars(SAMPLE), "points": None, "normals": np.empty((0, 3))})
-    message = filled(nothing)
-    assert len(message.points) == 0 and len(message.normals) == 0
+    assert not {"points", "normals"} & set(sizes_of_outputs(filled(nothing)))
+    assert not sizes_of_outputs(filled(hc.Contacts.none()))

@@ -9,6 +9,7 @@ import pytest
 from hpccd.msg import ContactArray, DistanceArray
 
 import hpccd_core as hc
+from hpccd_core.options import OUTPUTS
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.middleware import contact_messages, result_fields, snapshot_messages
@@ -21,14 +22,19 @@ NEAR = hc.Proximity(
     ee=np.array([[1, 2, 10, 13], [4, 5, 6, 7]], np.uint32),
     ee_distance=np.array([0.0, 0.75]),
     hash=2**64 - 5,
-    outputs={"closest": np.arange(24.0).reshape(4, 2, 3)},
+    outputs={
+        "normals": np.arange(12.0).reshape(4, 3),
+        "closest": np.arange(24.0).reshape(4, 2, 3),
+        "vertices": np.array([[3, 10, 11, 13], [12, 7, 0, 9], [1, 2, 10, 13], [4, 5, 6, 7]], np.uint32),
+        "weights": np.arange(16.0).reshape(4, 4),
+    },
 )
 HITS = hc.Intersections(ef=np.array([[1, 2, 9], [10, 13, 0], [14, 19, 19]], np.uint32), hash=7)
 
 
 def near(**options):
     message = ContactArray()
-    given = {"max_contacts": 0, "outputs": ("closest",)} | options
+    given = {"max_contacts": 0, "outputs": OUTPUTS} | options
     snapshot_messages.fill_proximity(message, NEAR, LAYOUT, **given)
     return message
 
@@ -42,18 +48,23 @@ def test_near_pairs():
     assert (message.total, message.truncated, message.hash) == (4, False, 2**64 - 5)
     assert list(message.topology_versions) == [3, 0, 9]
     back = contact_messages.read_contacts(message, LAYOUT)
-    for name in ("vf", "vf_distance", "ee", "ee_distance", "closest"):
+    for name in ("vf", "vf_distance", "ee", "ee_distance", *NEAR.outputs):
         assert np.array_equal(getattr(back, name), getattr(NEAR, name)), name
-    assert len(near(outputs=()).closest) == 0
+    assert list(message.vertices) == [3, 0, 1, 3, 2, 7, 0, 9, 1, 2, 0, 3, 4, 5, 6, 7], "within their meshes"
+    assert len(message.points) == len(message.approach) == 0
+    only = near(outputs=("closest",))
+    assert len(only.closest) == 24 and len(only.normals) == len(only.vertices) == len(only.weights) == 0
 
 
 @pytest.mark.parametrize("limit, kept", [(1, [2]), (2, [1, 2]), (3, [0, 1, 2])])
 def test_the_nearest_are_kept(limit, kept):
     message = near(max_contacts=limit)
     assert list(message.distance) == np.array([0.5, 0.25, 0.0, 0.75])[kept].tolist()
-    assert np.array_equal(np.frombuffer(message.closest).reshape(-1, 2, 3), NEAR.closest[kept])
     assert (message.total, message.truncated, message.hash) == (4, True, NEAR.hash)
-    assert len(contact_messages.read_contacts(message, LAYOUT).ee) == 1
+    back = contact_messages.read_contacts(message, LAYOUT)
+    for name, values in NEAR.outputs.items():
+        assert np.array_equal(getattr(back, name), values[kept]), name
+    assert len(back.ee) == 1
 
 
 @pytest.mark.parametrize("limit", [0, 2, 3])

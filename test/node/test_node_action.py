@@ -18,6 +18,7 @@ from long_step import MESHES, long_request, step_needs_more_than
 from node_calls import call, change_state
 from node_process import MODULE, PATIENCE, Peer
 
+from hpccd_core.options import OUTPUTS
 from hpccd_ros import client
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -69,7 +70,7 @@ def snapshot(query, **fields):
 
 @pytest.fixture
 def node(start_node):
-    return start_node({"meshes": ["cloth"], "detect_jobs": 2, "outputs": ["points", "normals", "closest"]})
+    return start_node({"meshes": ["cloth"], "detect_jobs": 2, "outputs": list(OUTPUTS)})
 
 
 @pytest.mark.parametrize(

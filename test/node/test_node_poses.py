@@ -87,10 +87,10 @@ def frame(k):
 def assert_result(message, k, tolerance=TOLERANCE, most=64):
     """The node's result to the step that ends with frame k is that of the parts it is made of; how many contacts."""
     meshes = (MeshSettings("cloth"), MeshSettings("blade", self_collision=False, input="pose"))
-    options = Options(backend="cpu", rigid=RigidOptions(tolerance, most))
+    options = Options(backend="cpu", outputs=("normals", "weights"), rigid=RigidOptions(tolerance, most))
     expected = StepDetector(SceneBuilder(meshes), options).detect(frame(k - 1), frame(k))
     got = contact_messages.read_contacts(message, Layout.of(NAMES, (SHEET, BLADE)))
-    for name in ("vf", "ee", "vf_toc", "ee_toc"):
+    for name in ("vf", "ee", "vf_toc", "ee_toc", *expected.contacts.outputs):
         assert np.array_equal(getattr(got, name), getattr(expected.contacts, name)), name
     assert message.hash == expected.contacts.hash
     arrays = client.contacts_from_message(message)
@@ -121,6 +121,7 @@ def test_streamed_recorded_and_verified(start_node, tmp_path, by):
             "record": str(path),
             "mesh.blade.frame": "blade_link" if by == "tf" else "",
             "rigid_tolerance": TOLERANCE,
+            "outputs": ["normals", "weights"],
         }
     )
     node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
@@ -138,6 +139,8 @@ def test_streamed_recorded_and_verified(start_node, tmp_path, by):
             total += assert_result(result, k)
             parts.add(result.parts)
     assert total > 100 and min(parts) > 1
+    with pytest.raises(ValueError, match=f"toc_gradients: the step was computed in {result.parts} parts; with rigid_"):
+        client.contacts_from_message(result).toc_gradients()
     assert set_parameter(node, "rigid_tolerance", 0.05).successful
     publisher.publish(stamped(9) if by == "pose" else transform(9))
     node.peer.vertices("cloth", sheet_positions(N, 9), stamp=9, frame_id="world")

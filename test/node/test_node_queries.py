@@ -12,6 +12,8 @@ from node_process import NodeProcess, assert_same_contacts
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
+from hpccd_core.options import OUTPUTS
+from hpccd_core.results import OUTPUT_ARRAYS
 from hpccd_ros import client
 from hpccd_ros.middleware import mesh_messages
 
@@ -36,7 +38,7 @@ def node(tmp_path_factory):
     given = {"minimum_separation": 1e-3, "pair_separation": ["cloth:net:0.004", "wall:cloth:0.5"]}
     node = NodeProcess(
         tmp_path_factory.mktemp("queries"),
-        {"meshes": [*MESHES, "wall"], "outputs": ["closest"], "max_contacts": 0, **given},
+        {"meshes": [*MESHES, "wall"], "outputs": list(OUTPUTS[1:]), "max_contacts": 0, **given},
     )
     yield node
     node.close()
@@ -63,10 +65,11 @@ def test_contacts_with_the_separation_of_the_node(node, query):
     response = ask(node, request(query=query))
     assert response.success and response.message.endswith("contacts"), response.message
     scene = separated(("cloth", "net", 0.004))
-    assert_same_contacts(response.contacts, frame(0), frame(1), scene, minimum_separation=1e-3)
+    assert_same_contacts(response.contacts, frame(0), frame(1), scene, minimum_separation=1e-3, outputs=OUTPUTS[1:])
     told = client.contacts_from_message(response.contacts)
     assert (told.minimum_separation, told.pair_separation) == (1e-3, {("cloth", "net"): 0.004})
-    assert told.closest.shape == (len(told), 2, 3)
+    assert told.closest.shape == (len(told), 2, 3) and len(told.points) == 0
+    assert told.weights.shape == (len(told), 4) and np.isfinite(told.toc_gradients()).any()
     assert len(response.distances.distance) == 0
 
 
@@ -97,10 +100,14 @@ def test_near_pairs(node, distance):
     response = ask(node, snapshot("proximity", distance=[distance]))
     assert response.success, response.message
     of_snapshot(response.contacts)
-    expected = hc.Detector(separated(), outputs=("closest",)).proximity(frame(1), distance)
+    expected = hc.Detector(separated(), outputs=OUTPUTS[1:]).proximity(frame(1), distance)
     got = client.scene_contacts(response.contacts, layout())
-    for name in ("vf", "vf_distance", "ee", "ee_distance", "closest"):
+    for name in ("vf", "vf_distance", "ee", "ee_distance", "normals", "closest", "vertices", "weights"):
         assert np.array_equal(getattr(got, name), getattr(expected, name)), name
+    assert len(got.points) == len(got.approach) == 0
+    if distance:
+        with pytest.raises(ValueError, match="toc_gradients: the message has no approach"):
+            client.contacts_from_message(response.contacts).toc_gradients()
     assert response.contacts.hash == expected.hash and response.contacts.total == len(expected)
     assert response.message == f"{len(expected)} pairs within {distance:g}"
     assert len(expected) > 10 or distance == 0
@@ -115,6 +122,7 @@ def test_edges_in_faces(node):
     assert np.array_equal(got.ef, expected.ef) and len(got.vf) == len(got.ee) == 0
     assert response.contacts.hash == expected.hash and len(expected) > 0
     assert set(response.contacts.kind) == {ContactArray.EDGE_FACE}
+    assert not any(len(getattr(response.contacts, name)) for name in OUTPUT_ARRAYS)
 
 
 def test_smallest_distances(node):

@@ -190,7 +190,8 @@ def test_the_sides_of_near_pairs_are_marked(start_node):
 
 def test_recorded_with_all_its_changes_and_verified(start_node, tmp_path, hpccd):
     path = tmp_path / "run.mcap"
-    node = start_node({"meshes": list(MESHES), "distances": True, "outputs": ["closest"], "record": str(path)})
+    given = {"distances": True, "outputs": ["closest", "weights"], "record": str(path)}
+    node = start_node({"meshes": list(MESHES), **given})
     stream = Stream(node)
     stream.expect()
     assert stream.set("minimum_separation", 1e-3).successful
@@ -198,12 +199,16 @@ def test_recorded_with_all_its_changes_and_verified(start_node, tmp_path, hpccd)
     assert stream.set("pair_separation", ["net:net:0.004", "cloth:net:0.002"]).successful
     stream.expect(1e-3, cloth_net=2e-3, net_net=4e-3)
     assert stream.set("distances", False).successful
-    stream.expect(1e-3, cloth_net=2e-3, net_net=4e-3)
+    assert stream.set("outputs", ["normals"]).successful
+    last = stream.expect(1e-3, cloth_net=2e-3, net_net=4e-3)
+    assert len(last.normals) == 3 * last.total and len(last.weights) == 0
     assert node.stop() == 0
     with Recording(path) as recording:
         replay = Replay(recording, recorded_setup.of_recording(recording))
         steps = list(replay.steps())
     assert (replay.verified, replay.diverged, replay.unverified) == (4, 0, 0)
+    *with_weights, without = (step.recorded for step in steps)
+    assert all(len(message.weights) == 4 * message.total > 0 for message in with_weights) and not len(without.weights)
     told = "0.001, net:net:0.004, cloth:net:0.002"
     assert [step.separation.text for step in steps] == ["", "0.001", told, told]
     found = replay.distances

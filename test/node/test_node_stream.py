@@ -16,6 +16,9 @@ from visualization_msgs.msg import MarkerArray
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
+from hpccd_core.options import OUTPUTS
+from hpccd_core.results import OUTPUT_ARRAYS
+from hpccd_ros import client
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.middleware import contact_messages, fields, mesh_messages, qos
 
@@ -39,7 +42,7 @@ def test_every_step_of_one_mesh(start_node, dtype):
         )
         assert (message.step, message.header.frame_id) == (100 + k, "world")
         assert (message.accuracy, message.backend, message.dropped_frames) == ("exact", "cpu", 0)
-        assert len(message.points) == len(message.normals) == 0
+        assert not any(len(getattr(message, name)) for name in OUTPUT_ARRAYS)
         found += assert_same_contacts(message, positions[k - 1], positions[k], scene_of(cloth=FACES))
     assert found > 100, "the scene is made to touch"
     node.frames_status(received=6, processed=6, dropped=0, waiting=0)
@@ -47,7 +50,7 @@ def test_every_step_of_one_mesh(start_node, dtype):
 
 def test_two_meshes_are_assembled_by_stamp(start_node):
     """The second mesh comes late and in another precision; each result joins equal stamps."""
-    node = start_node({"meshes": ["cloth", "net"], "frame_queue": 100, "outputs": ["points", "normals"]})
+    node = start_node({"meshes": ["cloth", "net"], "frame_queue": 100, "outputs": list(OUTPUTS)})
     scene = scene_of(cloth=FACES, net=FACES)
     node.peer.topology("net", FACES, N * N)
     node.peer.topology("cloth", FACES, N * N)
@@ -63,15 +66,27 @@ def test_two_meshes_are_assembled_by_stamp(start_node):
     between = 0
     for k, message in enumerate(node.contacts(4), start=1):
         assert list(message.mesh_names) == ["cloth", "net"]
-        assert_same_contacts(message, both[k - 1], both[k], scene)
+        assert_same_contacts(message, both[k - 1], both[k], scene, outputs=OUTPUTS)
         between += np.count_nonzero(
             np.frombuffer(message.mesh_a, np.uint32) != np.frombuffer(message.mesh_b, np.uint32)
         )
-        expected = hc.Detector(scene, outputs=("points", "normals")).detect(both[k - 1], both[k])
-        assert np.array_equal(np.frombuffer(message.points).reshape(-1, 3), expected.points)
-        assert np.array_equal(np.frombuffer(message.normals).reshape(-1, 3), expected.normals)
+        found = client.contacts_from_message(message)
+        expected = hc.Detector(scene, outputs=OUTPUTS).detect(both[k - 1], both[k])
+        assert_vertices_within_meshes(found)
+        for told, computed in zip(found.toc_gradients(), expected.toc_gradients(), strict=True):
+            assert np.array_equal(told, computed, equal_nan=True) and np.isfinite(told).any()
     assert between > 10, "the meshes are made to touch each other"
     node.frames_status(received=10, processed=10, dropped=0)
+
+
+def assert_vertices_within_meshes(found):
+    """Of faces their corners, of edges their ends; both meshes have the same faces."""
+    vertex_face = np.arange(len(found)) < found.n_vertex_face
+    v, corners = found.vertices[vertex_face, 0], found.vertices[vertex_face, 1:]
+    assert np.array_equal(v, found.features_a[vertex_face, 0])
+    assert np.array_equal(corners, FACES[found.features_b[vertex_face, 0]])
+    edges = np.concatenate([found.features_a, found.features_b], axis=1)
+    assert np.array_equal(found.vertices[~vertex_face], edges[~vertex_face])
 
 
 def test_scene_options_reach_the_core(start_node):
@@ -193,17 +208,21 @@ def test_topology_and_static_mesh_from_files(start_node, tmp_path):
 
 
 def test_truncated_contacts_are_the_earliest(start_node):
-    node = start_node({"meshes": ["cloth"], "max_contacts": 10})
+    node = start_node({"meshes": ["cloth"], "max_contacts": 10, "outputs": ["normals", "weights"]})
     node.peer.topology("cloth", FACES, N * N)
     frames = [sheet_positions(N, k) for k in range(2)]
     for k in range(2):
         node.peer.vertices("cloth", frames[k], stamp=k)
     message = node.contacts(1)[0]
-    full = hc.Detector(scene_of(cloth=FACES)).detect(*frames)
+    full = hc.Detector(scene_of(cloth=FACES), outputs=("normals", "weights")).detect(*frames)
     assert message.truncated and message.total == len(full) and len(message.toc) == 10
     earliest = np.sort(np.concatenate([full.vf_toc, full.ee_toc]))[:10]
     assert np.array_equal(np.sort(message.toc), earliest)
     assert message.hash == full.hash and message.first_toc == full.first_toc
+    kept = np.sort(np.argsort(np.concatenate([full.vf_toc, full.ee_toc]), kind="stable")[:10])
+    found = client.contacts_from_message(message)
+    for name in ("normals", "vertices", "weights", "approach"):
+        assert np.array_equal(getattr(found, name), getattr(full, name)[kept]), name
 
 
 def test_names_are_relative_and_remappable(start_node):

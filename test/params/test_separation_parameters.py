@@ -29,6 +29,7 @@ def test_markers_show_nearest_points_only_where_something_is_to_stay_apart():
     assert options(markers=True, minimum_separation=0.1).outputs == ("points", "normals", "closest")
     assert options(markers=True, pair_separation=["robot:cloth:0.1"]).outputs == ("points", "normals", "closest")
     assert options(outputs=["closest"]).outputs == ("closest",)
+    assert options(outputs=["weights", "points"]).outputs == ("points", "weights")
 
 
 @pytest.mark.parametrize(

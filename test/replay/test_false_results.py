@@ -14,6 +14,7 @@ from mcap_model import Bag
 
 import hpccd_core as hc
 from hpccd_core.options import REPORTS
+from hpccd_core.results import OUTPUT_ARRAYS
 from hpccd_ros.picture import view
 
 RESULT = 3
@@ -23,8 +24,8 @@ RESULT = 3
 def with_change(sound_bags, tmp_path):
     """Replays a copy with one result changed by `change(put, result)`, put(field, value); options for the node."""
 
-    def replay(change, **parameters):
-        bag = Bag.read(sound_bags / "streams.mcap")
+    def replay(change, source="streams.mcap", **parameters):
+        bag = Bag.read(sound_bags / source)
         info = json.loads(bag.metadata[0].metadata["json"])
         info["parameters"] |= parameters
         bag.metadata[0].metadata["json"] = json.dumps(info)
@@ -81,9 +82,36 @@ def test_an_entry_that_is_not_used(with_change):
     _diverges(with_change(change), "malformed: features_b of contact 0 are ")
 
 
-@pytest.mark.parametrize("name", ["points", "normals"])
-def test_points_of_another_number(with_change, name):
-    _diverges(with_change(lambda put, result: put(name, np.zeros(4))), f"malformed: {name} has 4 entries for")
+@pytest.mark.parametrize("name", OUTPUT_ARRAYS)
+def test_outputs_of_another_number(with_change, name):
+    def change(put, result):
+        put(name, np.zeros(5, getattr(result, name).dtype))
+
+    _diverges(with_change(change), f"malformed: {name} has 5 entries for")
+
+
+@pytest.mark.parametrize("name", OUTPUT_ARRAYS)
+def test_an_output_that_the_core_does_not_compute(with_change, name):
+    """A replay computes the outputs that a result has; everything.mcap has all."""
+    done = with_change(lambda put, result: None, "everything.mcap")
+    assert done.status == 0 and "VERIFIED" in done.out, done.out
+
+    def change(put, result):
+        values = getattr(result, name).copy()
+        values[-1] = values[-1] + 1 if values.dtype.kind == "u" else np.nextafter(values[-1], np.inf)
+        put(name, values)
+
+    done = with_change(change, "everything.mcap")
+    assert done.status == 1 and f"{name} of contact " in done.out and "] was recorded, now it is [" in done.out
+
+
+def test_a_zero_of_another_sign(with_change):
+    def change(put, result):
+        assert (result.weights == 0).any()
+        put("weights", np.where(result.weights == 0, -result.weights, result.weights))
+
+    done = with_change(change, "everything.mcap")
+    assert done.status == 1 and "weights of contact " in done.out, done.out
 
 
 def test_marked_as_cut_off_though_it_is_whole(with_change):
@@ -108,7 +136,7 @@ def _only(rows):
     def change(put, result):
         for name, size in {"kind": 1, "mesh_a": 1, "mesh_b": 1, "features_a": 2, "features_b": 2, "toc": 1}.items():
             put(name, getattr(result, name).reshape(-1, size)[rows].reshape(-1))
-        for name in ("points", "normals"):
+        for name in OUTPUT_ARRAYS:
             put(name, getattr(result, name)[:0])
         put("total", len(result.kind))
         put("first_toc", float(min(result.toc, default=math.inf)))

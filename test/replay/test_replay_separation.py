@@ -152,6 +152,9 @@ def test_the_command_tells_the_separations(near_bag, tmp_path, hpccd):
         ({"separations": [0.5]}, "malformed: separation_mesh_a, separation_mesh_b and separations have 0, 0 and 1"),
         ({"distance": [0.5]}, "malformed: distance has 1 entries; contacts of a step have none"),
         ({"closest": [0.5]}, "malformed: closest has 1 entries"),
+        ({"vertices": [5] * 6}, "malformed: vertices has 6 entries"),
+        ({"weights": [0.5]}, "malformed: weights has 1 entries"),
+        ({"approach": [-0.5]}, "malformed: approach has 1 entries"),
     ],
 )
 def test_a_result_with_another_separation_diverges(changed, changes, says):

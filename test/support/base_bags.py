@@ -6,6 +6,7 @@ from bag_tools import typestore
 from mcap_model import Bag
 from sources import ROOT
 
+from hpccd_core.options import OUTPUTS
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.detect.step_detector import StepDetector
@@ -18,7 +19,7 @@ FIRST, FRAMES = 55, 8  # of the recording of the repository: its contacts are of
 SCENE = {
     "meshes": ["cloth", "net", "floor"],
     "frame_id": "world",
-    "outputs": ["points", "normals"],
+    "outputs": list(OUTPUTS),
     "minimum_separation": 1e-3,
     "pair_separation": ["cloth:net:0.002"],
     "mesh.floor.static": True,
@@ -183,7 +184,7 @@ def _results(path):
     with Recording(path) as recording:
         setup = recorded_setup.of_recording(recording)
         detector = StepDetector(setup.builder, setup.options("exact", "cpu", 1))
-        for step in Replay(recording, setup, outputs=("points", "normals"), backend="cpu").steps():
+        for step in Replay(recording, setup, outputs=OUTPUTS, backend="cpu").steps():
             contacts = ContactArray(step=step.step, accuracy="exact", backend="cpu")
             contact_messages.fill_contacts(contacts, step.contacts, step.layout)
             result_fields.fill_separation(contacts, step.separation)

@@ -81,3 +81,6 @@ class ContactArray(IdlStruct, typename="hpccd::msg::dds_::ContactArray_"):
     input_sent: sequence[int64]
     input_flags: sequence[uint8]
     report: uint32
+    vertices: sequence[uint32]
+    weights: sequence[float64]
+    approach: sequence[float64]

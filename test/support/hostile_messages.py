@@ -8,6 +8,8 @@ import numpy as np
 from bag_tools import typestore
 from hostile_kinds import KINDS, LARGE, NUMBERS, decoded, info_of, kind, set_info, topic_of
 
+from hpccd_core.results import OUTPUT_ARRAYS
+
 
 @kind
 def payload(rng, bag):
@@ -57,8 +59,7 @@ def changed_result(rng, bag):
                 "features_a",
                 "features_b",
                 "toc",
-                "points",
-                "normals",
+                *OUTPUT_ARRAYS,
                 "first_toc",
                 "total",
                 "truncated",
@@ -180,7 +181,7 @@ def unused_entry_used(rng, bag):
 @kind
 def no_contacts_claimed(rng, bag):
     def change(put, result):
-        for name in ("kind", "mesh_a", "mesh_b", "features_a", "features_b", "toc", "points", "normals"):
+        for name in ("kind", "mesh_a", "mesh_b", "features_a", "features_b", "toc", *OUTPUT_ARRAYS):
             put(name, getattr(result, name)[:0])
         put("truncated", rng.random() < 0.5)
         if rng.random() < 0.5:

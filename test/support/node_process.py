@@ -199,14 +199,14 @@ class Peer:
 
 
 def assert_same_contacts(message: ContactArray, t0: np.ndarray, t1: np.ndarray, scene: hc.Scene, **options: Any) -> int:
-    """Assert that contacts equal those of the core on the same positions; returns their number."""
+    """Assert that contacts, and outputs in ``options``, equal the core's on these positions; returns their number."""
     expected = hc.Detector(scene, **options).detect(t0, t1)
     names = tuple(message.mesh_names)
     vertex_offsets = [scene.vertex_offset(name) for name in names] + [scene.n_vertices]
     face_offsets = [scene.face_offset(name) for name in names] + [scene.n_faces]
     layout = Layout(names, np.array(vertex_offsets), np.array(face_offsets))
     got = contact_messages.read_contacts(message, layout)
-    for name in ("vf", "ee", "vf_toc", "ee_toc"):
+    for name in ("vf", "ee", "vf_toc", "ee_toc", *expected.outputs):
         assert np.array_equal(getattr(got, name), getattr(expected, name)), name
     assert message.hash == expected.hash
     assert message.first_toc == expected.first_toc
