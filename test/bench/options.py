@@ -65,6 +65,8 @@ def _runners(step: Step, args) -> list[Runner]:
         "report any": {"report": "any"},
         "with points": {"outputs": ("points",)},
         "with points and normals": {"outputs": ("points", "normals")},
+        "with normals": {"outputs": ("normals",)},
+        "with normals and weights": {"outputs": ("normals", "weights")},
     }.items():
         found.append(Runner(name, {**base, **options}, change=_full))
     if any(mesh.static or not mesh.self_collision for mesh in step.meshes) or step.ignored_pairs:
