@@ -92,7 +92,7 @@ class Detector(
         Report features that come within this distance, in the unit of the coordinates; 0 reports only contact. Keep
         it below the distance of neighbours within each mesh (distances() at rest), or these are always reported.
     features : {"vertex_face", "edge_edge"} or both
-        Which pairs of features are tested by detect, step, collision_free_step and proximity.
+        Which pairs of features are tested by detect, step, collision_free_step, collision_free_motion and proximity.
     results : {"host", "device"}
         Results as numpy arrays, or left in the GPU's memory (DeviceContacts and others).
     worlds : int, optional
@@ -117,10 +117,11 @@ class Detector(
 
     Notes
     -----
-    Queries of a motion: :meth:`detect`, :meth:`step`, :meth:`collision_free_step`. Queries of one frame:
-    :meth:`proximity`, :meth:`intersections`, :meth:`distances`. All take positions and `stream` as :meth:`detect` does,
-    and raise the same errors. Calls from several threads wait for each other; only :meth:`cancel` does not. A child
-    process made by os.fork() cannot use a detector with more than one thread. Detectors cannot be pickled.
+    Queries of a motion: :meth:`detect`, :meth:`step`, :meth:`collision_free_step`, :meth:`collision_free_motion`. Queries of
+    one frame: :meth:`proximity`, :meth:`intersections`, :meth:`distances`. All take positions and `stream` as
+    :meth:`detect` does, and raise the same errors. Calls from several threads wait for each other; only :meth:`cancel`
+    does not. A child process made by os.fork() cannot use a detector with more than one thread. Detectors cannot be
+    pickled.
 
     Examples
     --------

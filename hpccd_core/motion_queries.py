@@ -121,18 +121,13 @@ class MotionQueries(Generic[MotionResult, StepResult]):
         Returns
         -------
         CollisionFreeMotion
-            In host memory, also with results="device".
-
-        Raises
-        ------
-        TypeError, ValueError
-            For invalid groups.
+            In host memory, computed by the CPU on every backend.
 
         Notes
         -----
         No factor is below 0.9 times `collision_free_step`, unless rounding leaves no such position. The result is
         tested from the start, on the rounded numbers that are returned, at the detector's accuracy. Vertices that do
-        not move have the factor 1. The CPU computes it, on every backend.
+        not move have the factor 1.
 
         Examples
         --------

@@ -141,6 +141,10 @@ def _triples(digits: int, **heads: str) -> lab.Columns:
     return {f"{head.replace('_', ' ')}, ms: median, p95, p99": joined(*of, digits=digits) for head, of in keys.items()}
 
 
+def _of_motions(rows):
+    return by("key", "way")([{**row, "key": (row["scene"], row["number"])} for row in rows])
+
+
 SIZE = _same("scene", "triangles", "contacts")
 OVER_ALL = {"first": "first (/ all)", "step": "`collision_free_step` (/ all)", "trial": "trial steps (/ all)"}
 METHODS = {f"`{name}`": name for name in ("default", "published", "naive", "front")}
@@ -209,6 +213,17 @@ TABLES = {
         | {head: cell(query, shown=over("step_ms", "over_base")) for query, head in OVER_ALL.items()}
         | {"ratio to ipctk": cell("step", shown=lambda row: f"{row['times_faster_than_ipctk']:,.0f}")},
         by("scene", "query"),
+    ),
+    "motions": Table(
+        ("motion-2-cores",),
+        {"scene": "scene", "step size": lambda row: f"{row['step']:.2g}"}
+        | {
+            head: cell(way, shown=lambda row: f"{row['mean']:.3f}, {row['smallest_over_step']:.2g}")
+            for head, way in {"mean factor, smallest / step size": "motion", "ipctk: the same": "ipctk"}.items()
+        }
+        | {"ms (/ detect)": cell("motion", shown=over("median_ms", "over_detect"))}
+        | {"ipctk, ms": cell("ipctk", shown=lambda row: round(row["median_ms"]))},
+        _of_motions,
     ),
     "rigid-cost": Table(
         ("rigid-cost-2-cores",),

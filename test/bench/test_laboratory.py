@@ -29,6 +29,7 @@ SUBJECTS = {
     "options": ("n-body-like-lr", "--size", "0.02", "--steps", "1", "--landscape", "200", *ONE),
     "distance": (*STRIP, "--separations", "0.02,0.002"),
     "step": STRIP,
+    "motion": ("rod-twist-like", "--size", "0.02", "--steps", "1", *ONE),
     "accuracy": ("--parts", "sweeps", "--sweep-queries", "40"),
     "rigid": ("--parts", "truth,bounds", "--queries", "200"),
 }
@@ -91,6 +92,13 @@ def check_step(rows):
     every, first, free, trial = rows
     assert every["contacts"] >= first["contacts"] > 0 and trial["listing_ms"] > 0
     assert 0 <= free["earliest"] <= every["earliest"] == first["earliest"] <= 1
+
+
+def check_motion(rows):
+    alike, each = rows
+    assert (alike["way"], each["way"]) == ("step", "motion") and alike["touching"] == each["touching"] == 0
+    assert each["mean"] > alike["mean"] == pytest.approx(0.9 * alike["step"])
+    assert each["smallest_over_step"] >= 0.9 * (1 - 1e-9)
 
 
 def check_accuracy(rows):
