@@ -64,8 +64,8 @@ class Account:
     def plausible(self) -> bool:
         """Whether all that `lines` tells is as it must be."""
         ledger = self._simulation.ledger
-        came = np.abs([ledger.gravity, ledger.ball, ledger.air]).sum()
-        turned = abs(self.state.spin - ledger.ball_spin - ledger.air_spin)
+        came = np.abs([ledger.gravity, ledger.ball, ledger.air, ledger.held]).sum()
+        turned = abs(self.state.spin - ledger.ball_spin - ledger.air_spin - ledger.held_spin)
         return bool(
             sum(self._intersections) == 0
             and self._error <= ROUNDING
@@ -82,12 +82,13 @@ class Account:
         return [
             f"intersections  {sum(self._intersections)} in all {len(self._intersections)} frames",
             f"moves          {frames}, {self._shortened} of them shortened, {self._again} solved more than once",
+            f"simulated      {self._simulation.time:.3f} s, {1e3 * self._simulation.time / frames:.2f} ms a move",
             f"free fall      first {self._flight:.2f} s: its centre is within {self._error:.1e} m of a falling point",
-            f"momentum       what gravity, ball and air gave explains it but for {self._unexplained:.1e} N s at most",
-            f"spin           {state.spin:.4f} kg m2/s, of which the ball and the air gave "
-            f"{ledger.ball_spin + ledger.air_spin:.4f}",
-            f"energy         {start:.3f} J at the start + {ledger.work:.3f} J from the ball = "
-            f"{state.energy:.3f} J there + {self._lost[-1]:.3f} J lost",
+            f"momentum       gravity, ball, air and held vertices explain it to within {self._unexplained:.1e} N s",
+            f"spin           {state.spin:.4f} kg m2/s, of which ball, air and held vertices gave "
+            f"{ledger.ball_spin + ledger.air_spin + ledger.held_spin:.4f}",
+            f"energy         {start:.3f} J at the start + {ledger.work:.3f} J from the ball + {ledger.held_work:.3f} J "
+            f"from held vertices = {state.energy:.3f} J there + {self._lost[-1]:.3f} J lost",
             f"               to friction, air and impacts: in no move less than {min(np.diff(self._lost)):.1e} J",
             f"time           {1e3 * took / frames:.1f} ms a frame (median {1e3 * np.median(self._seconds):.1f}), "
             f"{100 * asked / took:.0f} % of it in hpccd",

@@ -7,6 +7,7 @@ import tempfile
 import time
 from pathlib import Path
 
+import numpy as np
 import rclpy
 from cloth_solver.queries import Queries
 from hpccd.msg import ContactArray, MeshTopology, MeshVertices
@@ -26,7 +27,7 @@ PATIENCE = 60.0
 # QoS of every response.
 ACCURACY = "exact"
 # Outputs that the solver needs besides the contacts; no limit on their number.
-PARAMETERS = {"outputs": ["normals", "closest"], "max_contacts": 0}
+PARAMETERS = {"outputs": ["normals", "weights"], "max_contacts": 0}
 
 
 def write_parameters(scene, path: Path) -> None:
@@ -67,7 +68,7 @@ class OverDds(Queries):
     def __init__(self, setup, meshes, name: str):
         super().__init__()
         self._setup, self._meshes, self._name = setup, meshes, name
-        self._ends = (meshes[0].n_vertices, sum(mesh.n_vertices for mesh in meshes))
+        self._ends = np.cumsum([mesh.n_vertices for mesh in meshes])[:-1]
         topologies = tuple(client.Topology(0, mesh.n_vertices, mesh.faces) for mesh in meshes)
         self._layout = client.Layout.of(tuple(mesh.name for mesh in meshes), topologies)
         client.prepare_environment()
@@ -108,9 +109,9 @@ class OverDds(Queries):
             question = {"query": "contacts", "minimum_separation": [self._setup.reach]}
             response = self._ask(self._request(start, end, **question)).contacts
             found = client.scene_contacts(response, self._layout)
-            if not response.total == len(found.normals) == len(found.closest):
+            if not response.total == len(found.normals) == len(found.weights):
                 raise UserError(
-                    f"node {self._name} leaves out pairs, normals or nearest points: start it with the file that "
+                    f"node {self._name} leaves out pairs, normals or weights: start it with the file that "
                     "--params writes"
                 )
             return found
@@ -138,8 +139,7 @@ class OverDds(Queries):
         self._frames += 1
 
     def _by_mesh(self, positions):
-        first, last = self._ends
-        return dict(zip((mesh.name for mesh in self._meshes), (positions[:first], positions[first:last]), strict=True))
+        return dict(zip((mesh.name for mesh in self._meshes), np.split(positions, self._ends), strict=True))
 
     def _messages(self, positions, stamp):
         return [client.vertices_message(x, stamp, step=self._frames) for x in self._by_mesh(positions).values()]

@@ -3,13 +3,16 @@
 """A square cloth falls on a spinning ball, and never touches it or itself.
 
 A simulator with three queries to hpccd: pairs within the separation during a step (constraints of the solver), the
-collision-free part of a solved move (the step size), and, as a check, intersections. The physics is in the package
-cloth_solver beside this file; docs/simulators.md explains it.
+collision-free part of a solved move (one step size, or one for each vertex), and, as a check, intersections. The
+physics is in the package cloth_solver beside this file; docs/simulators.md explains it.
 
   python examples/cloth_on_ball/run.py
                         in this process; a minute or two, with a picture in cloth_on_ball.png
   python examples/cloth_on_ball/run.py --cells 40 --frames 100
                         a coarse mesh, a few seconds
+  python examples/cloth_on_ball/run.py --pinched --step vertices
+                        a corner of the cloth is pinched below a plate, and the rest falls: with one step for all
+                        vertices the cloth would be stuck
   python examples/cloth_on_ball/run.py --mcap cloth.mcap
                         also a recording of the frames, for `hpccd replay` and `hpccd view`
   python examples/cloth_on_ball/run.py --node --mcap cloth.mcap
@@ -38,7 +41,7 @@ from cloth_solver.setup import Setup
 
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.scenes.progress import track
-from hpccd_ros.scenes.scene import Frame, Mesh, Scene
+from hpccd_ros.scenes.scene import Frame, Scene
 
 
 def main(argv=None) -> int:
@@ -79,6 +82,15 @@ def _arguments(argv):
         metavar="RAD/S",
         help="spin of the ball (default: %(default)s); at 12 some moves are solved repeatedly",
     )
+    parser.add_argument(
+        "--pinched", action="store_true", help="a corner of the cloth lies between the ball and a plate, the rest falls"
+    )
+    parser.add_argument(
+        "--step",
+        choices=("global", "vertices"),
+        default="global",
+        help="shorten a blocked move by one factor for all vertices (default), or by one for each",
+    )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the cloth's unevenness (default: 0)")
     parser.add_argument(
         "--threads", type=int, default=0, metavar="N", help="threads of the detector; 0: all cores (default)"
@@ -118,27 +130,28 @@ def _arguments(argv):
     for path in (args.mcap, args.npz, args.params, args.picture):  # not found out after the simulation
         if path and not path.parent.is_dir():
             parser.error(f"{path}: there is no folder {path.parent}")
+    if args.node is not None and args.step == "vertices":
+        parser.error("--step vertices: a node returns one factor for a step; leave out --node or take --step global")
     return args
 
 
 def run(args) -> int:
     """Simulate, write what was asked for, and tell how it went."""
-    setup = Setup(cells=args.cells, spin=args.spin)
-    meshes = _meshes(setup, args.seed)
+    setup = (Setup.pinched if args.pinched else Setup)(cells=args.cells, spin=args.spin)
     positions: list[np.ndarray] = []
     times: list[float] = []
-    scene = _scene(setup, meshes, positions, times, args.frames)
+    scene = _scene(setup, positions, times, args.frames)
     if args.params:
         from over_dds import write_parameters
 
         write_parameters(scene, args.params)
         return 0
     with contextlib.ExitStack() as stack:
-        queries = _queries(args, setup, scene, meshes, stack)
-        simulation = Simulation(setup, queries, args.seed)
+        queries = _queries(args, setup, scene, stack)
+        simulation = Simulation(setup, queries, args.seed, args.step)
         account = Account(simulation, queries)
         print(
-            f"cloth {len(meshes[0].faces):,} triangles, ball {len(meshes[1].faces):,}; "
+            f"cloth {len(scene.meshes[0].faces):,} triangles, ball {len(scene.meshes[1].faces):,}; "
             f"{setup.substeps} small steps a move",
             flush=True,
         )
@@ -155,27 +168,24 @@ def run(args) -> int:
     return 0 if account.plausible else 1
 
 
-def _meshes(setup, seed):
-    cloth, cloth_faces = setup.cloth(seed)
-    ball, ball_faces = setup.ball()
-    return Mesh("cloth", cloth_faces, len(cloth)), Mesh("ball", ball_faces, len(ball), self_collision=False)
+def _scene(setup, positions, times, frames) -> Scene:
+    meshes = setup.meshes()
+    ends = np.cumsum([mesh.n_vertices for mesh in meshes])[:-1]
 
-
-def _scene(setup, meshes, positions, times, frames) -> Scene:
     def frame(index):
-        cloth, ball = np.split(positions[index], [meshes[0].n_vertices])
-        return Frame([cloth, ball], index, times[index])
+        return Frame(np.split(positions[index], ends), index, times[index])
 
-    return Scene("cloth-on-ball", "a cloth on a spinning ball", meshes, frames, setup.period, frame)
+    title = "a cloth on a spinning ball"
+    return Scene("cloth-on-ball", title, meshes, frames, setup.period, frame, ignored_pairs=setup.ignored_pairs)
 
 
-def _queries(args, setup, scene, meshes, stack):
+def _queries(args, setup, scene, stack):
     if args.node is None:
-        return InProcess(setup, meshes[0].faces, meshes[1].faces, meshes[1].n_vertices, args.threads)
+        return InProcess(setup, args.threads)
     from over_dds import OverDds, started_node
 
     name = args.node or stack.enter_context(started_node(scene, args.threads, args.mcap))
-    return stack.enter_context(OverDds(setup, meshes, name))
+    return stack.enter_context(OverDds(setup, scene.meshes, name))
 
 
 def _write(args, scene):

@@ -66,6 +66,24 @@ def test_moves_that_are_shortened_are_the_same_over_dds(tmp_path):
     check_same_frames(tmp_path / "here.npz", tmp_path / "dds.npz")
 
 
+PINCHED = ("--cells", "40", "--pinched", "--frames", "34", "--picture", "")
+
+
+def test_a_pinched_corner_with_a_step_for_each_vertex(tmp_path):
+    said = run(tmp_path, *PINCHED, "--step", "vertices")
+    assert "intersections  0 in all 34 frames" in said
+    assert re.search(r"plausible +yes", said)
+    assert int(re.search(r"(\d+) of them shortened", said)[1]) > 0
+    assert "0.330 s, 10.00 ms a move" in said
+
+
+def test_a_pinched_corner_with_a_node_in_the_loop(tmp_path):
+    """The plate, too, is a mesh of the node, and is not tested against the ball."""
+    for words in (("--npz", "here.npz"), ("--node", "--npz", "dds.npz")):
+        run(tmp_path, *PINCHED, *words)
+    check_same_frames(tmp_path / "here.npz", tmp_path / "dds.npz")
+
+
 @contextlib.contextmanager
 def running_node(*words):
     """A node with these ROS arguments; its name."""
@@ -91,13 +109,13 @@ def test_with_a_node_that_runs_already(tmp_path):
 
 @pytest.mark.parametrize(
     "words",
-    [("-p", "max_contacts:=0"), ("-p", "outputs:=[normals, closest]", "-p", "max_contacts:=1")],
+    [("-p", "max_contacts:=0"), ("-p", "outputs:=[normals, weights]", "-p", "max_contacts:=1")],
     ids=["no outputs", "not all pairs"],
 )
 def test_a_node_that_leaves_out_what_the_solver_needs(tmp_path, words):
     with running_node("-p", "meshes:=[cloth, ball]", *words) as name:
         said = run(tmp_path, *SMALL, "--node", name, status=2)
-    assert "leaves out pairs, normals or nearest points: start it with the file that --params writes" in said
+    assert "leaves out pairs, normals or weights: start it with the file that --params writes" in said
 
 
 @pytest.mark.parametrize(
@@ -127,6 +145,7 @@ def test_a_cloth_that_is_stuck_ends_with_one_sentence(tmp_path):
         (("--spin", "nan"), "--spin nan: from 0 to 30"),
         (("--picture", "a.xyz"), "--picture a.xyz: name a file that ends in .png"),
         (("--npz", "no/a.npz"), "there is no folder no"),
+        (("--node", "--step", "vertices"), "--step vertices: a node returns one factor for a step; leave out --node"),
         (("--mcap", "a.bag"), "a.bag: name a file that ends in .mcap"),
         (("--npz", "there.npz"), "there.npz: name a file that ends in .npz and does not exist yet"),
     ],

@@ -18,23 +18,27 @@ MOVES = 80
 
 
 def queries_of(setup, threads=1, kind=InProcess):
-    _, cloth_faces = setup.cloth(0)
-    ball, ball_faces = setup.ball()
-    return kind(setup, cloth_faces, ball_faces, len(ball), threads)
+    return kind(setup, threads)
 
 
-def faces_of(setup):
-    return [setup.cloth(0)[1], setup.ball()[1]]
-
-
-def run(moves=MOVES, setup=SETUP, **options):
+def run(moves=MOVES, setup=SETUP, step="global", **options):
     """(simulation, positions of all frames, moves)."""
-    simulation = Simulation(setup, queries_of(setup, **options))
+    simulation = Simulation(setup, queries_of(setup, **options), step=step)
     positions, made = [simulation.positions], []
     for _ in range(moves):
         made.append(simulation.move())
         positions.append(simulation.positions)
     return simulation, positions, made
+
+
+def check_nothing_touches(setup, positions):
+    """By the exact oracle, which shares nothing with the detector that the solver asked."""
+    meshes = setup.meshes()
+    faces, obstacles = [mesh.faces for mesh in meshes], range(1, len(meshes))
+    for start, end in zip(positions, positions[1:], strict=False):
+        contacts = oracle.brute_force(start, end, faces, no_self_collision=obstacles)
+        assert len(contacts.vf) == len(contacts.ee) == 0
+    assert len(oracle.intersections(positions[-1], faces, no_self_collision=obstacles)) == 0
 
 
 @pytest.fixture(scope="module")
@@ -53,19 +57,14 @@ def test_cloth_winds_round_the_ball(wound):
 
 
 def test_no_move_touches_anything(wound):
-    """By the exact oracle, which shares nothing with the detector that the solver asked."""
-    _, positions, _ = wound
-    for start, end in zip(positions[20:], positions[21:], strict=False):
-        contacts = oracle.brute_force(start, end, faces_of(SETUP), no_self_collision=[1])
-        assert len(contacts.vf) == len(contacts.ee) == 0
-    assert len(oracle.intersections(positions[-1], faces_of(SETUP), no_self_collision=[1])) == 0
+    check_nothing_touches(SETUP, wound[1][20:])
 
 
 def test_what_is_unresolved_would_touch(wound):
     """Else the test above would test nothing."""
     simulation, positions, _ = wound
     end = simulation.trial(10 * SETUP.period)
-    contacts = oracle.brute_force(positions[-1], end, faces_of(SETUP), no_self_collision=[1])
+    contacts = oracle.brute_force(positions[-1], end, [mesh.faces for mesh in SETUP.meshes()], no_self_collision=[1])
     assert len(contacts.vf) > 10
 
 
@@ -121,9 +120,57 @@ def test_a_solver_that_misses_pairs_is_slow_but_never_touches():
         positions.append(simulation.positions)
     assert sum(part < 1.0 for part in parts) >= 6
     assert simulation.time > 0.8 * MOVES * SETUP.period, "it goes on"
-    for start, end in zip(positions, positions[1:], strict=False):
-        contacts = oracle.brute_force(start, end, faces_of(SETUP), no_self_collision=[1])
-        assert len(contacts.vf) == len(contacts.ee) == 0
+    check_nothing_touches(SETUP, positions)
+
+
+def test_steps_of_vertices_are_the_global_one_where_nothing_is_blocked(wound):
+    _, positions, made = wound
+    assert all(move.part == 1.0 for move in made)
+    np.testing.assert_array_equal(positions[-1], run(step="vertices")[1][-1])
+
+
+# A corner is pinched below the plate, and the opposite one falls.
+PINCHED = Setup.pinched(20, ball_frequency=6)
+
+
+def test_a_pinched_corner_blocks_the_global_step():
+    with pytest.raises(Stuck, match="at 0[.]0.* s: 20 moves .*; take the step 'vertices', a finer cloth"):
+        run(40, PINCHED)
+
+
+def test_steps_of_vertices_go_on_where_the_global_one_is_blocked():
+    simulation, positions, made = run(40, PINCHED, step="vertices")
+    assert simulation.time == pytest.approx(40 * PINCHED.period)
+    assert sum(move.part < 1.0 for move in made) > 20, "the corner is blocked"
+    n_cloth = (PINCHED.cells + 1) ** 2
+    pinched, opposite = np.linalg.norm(positions[-1] - positions[0], axis=1)[[0, n_cloth - 1]]
+    assert pinched < 0.1 < 0.3 < opposite, "and the rest falls"
+    check_nothing_touches(PINCHED, positions)
+
+
+def test_a_ball_that_is_blocked_turns_less_and_keeps_its_shape():
+    setup = Setup(12, ball_frequency=6, spin=30.0)
+    queries = queries_of(setup, kind=Blind)
+    simulation = Simulation(setup, queries, step="vertices")
+    late, n_cloth = [], (setup.cells + 1) ** 2
+    for move in range(60):
+        queries.blind = move >= 20
+        simulation.move()
+        late.append(simulation.late)
+        ball = setup.turned(setup.ball()[0], simulation.time - simulation.late)
+        np.testing.assert_allclose(simulation.positions[n_cloth:], ball, atol=1e-7)
+    assert late[-1] > 0.0
+
+
+def test_momentum_and_energy_are_accounted_for_where_vertices_are_held():
+    queries = queries_of(PINCHED)
+    simulation = Simulation(PINCHED, queries, step="vertices")
+    account = Account(simulation, queries)
+    account.enter(None, 0.0)
+    for _ in range(40):
+        account.enter(simulation.move(), 0.01)
+    assert account.plausible, account.lines()
+    assert simulation.ledger.held.any()
 
 
 def test_a_solver_that_is_stuck_says_so():

@@ -16,7 +16,7 @@ from hpccd_core import shapes
 from hpccd_ros import scenes
 from hpccd_ros.scenes import cache
 from hpccd_ros.scenes.progress import track
-from hpccd_ros.scenes.scene import Frame, Mesh, Scene
+from hpccd_ros.scenes.scene import Frame, Scene
 
 # s; four moves of the solver in one, or nothing would be hit: layers at rest are its thickness apart.
 TRIAL = 0.04
@@ -65,9 +65,7 @@ def _moves(chosen, count, seed, progress):
 
 def _simulate(chosen, count, seed, progress) -> dict[str, np.ndarray]:
     """positions (count + 1, V, 3) float32 and times (count + 1,) of the moves, and what was tried from there."""
-    _, cloth_faces = chosen.cloth(seed)
-    ball, ball_faces = chosen.ball()
-    simulation = motion.Simulation(chosen, queries.InProcess(chosen, cloth_faces, ball_faces, len(ball)), seed)
+    simulation = motion.Simulation(chosen, queries.InProcess(chosen), seed)
     positions = np.empty((count + 1, *simulation.positions.shape), np.float32)
     trials, times = np.empty_like(positions), np.zeros(count + 1)
     for index in track(range(count + 1), "simulating a cloth that never touches", progress):
@@ -78,15 +76,10 @@ def _simulate(chosen, count, seed, progress) -> dict[str, np.ndarray]:
 
 
 def _scene(name, chosen, frames, at) -> Scene:
-    cloth, cloth_faces = chosen.cloth(0)
-    ball, ball_faces = chosen.ball()
+    meshes = chosen.meshes()
 
     def frame(index: int) -> Frame:
         positions, time = at(index)
-        return Frame([positions[: len(cloth)], positions[len(cloth) :]], index, float(time))
+        return Frame(np.split(positions, [meshes[0].n_vertices]), index, float(time))
 
-    meshes = (
-        Mesh("cloth", cloth_faces, len(cloth)),
-        Mesh("ball", ball_faces, len(ball), self_collision=False),
-    )
     return Scene(name, name, meshes, frames, chosen.period, frame)

@@ -34,14 +34,15 @@ class State:
 class Ledger:
     """Momentum and energy received since the start, besides the present ones.
 
-    gravity, ball, air: (3,) momentum that each gave; ball_spin, air_spin: angular momentum about z; work: of the ball.
+    gravity, ball, air, held: (3,) momentum that each gave (ball: with the plate; held: vertices that were held back);
+    ball_spin, air_spin, held_spin: angular momentum about z; work, held_work: of the ball, of holding vertices back.
     """
 
     def __init__(self, setup: Setup, n_cloth: int):
         self._setup, self._n = setup, n_cloth
         self._springs = Springs(setup, setup.period / setup.substeps)
-        self.gravity, self.ball, self.air = np.zeros(3), np.zeros(3), np.zeros(3)
-        self.ball_spin = self.air_spin = self.work = 0.0
+        self.gravity, self.ball, self.air, self.held = np.zeros((4, 3))
+        self.ball_spin = self.air_spin = self.held_spin = self.work = self.held_work = 0.0
 
     def open(self, positions: np.ndarray, velocity: np.ndarray) -> None:
         """The state at the start."""
@@ -55,6 +56,12 @@ class Ledger:
         self.work += part * ball.work
         self.air -= part * air.impulse
         self.air_spin -= part * air.spin
+
+    def hold(self, solved: State, kept: State) -> None:
+        """What the cloth loses, or gains, where vertices keep a share of their solved move."""
+        self.held += kept.momentum - solved.momentum
+        self.held_spin += kept.spin - solved.spin
+        self.held_work += kept.energy - solved.energy
 
     def state(self, positions: np.ndarray, velocity: np.ndarray) -> State:
         setup, n = self._setup, self._n
@@ -71,9 +78,9 @@ class Ledger:
 
     def unexplained_momentum(self, now: State) -> float:
         """Length of the momentum that nothing in the ledger explains, kg m/s."""
-        rest = now.momentum - self.start.momentum - self.gravity - self.ball - self.air
+        rest = now.momentum - self.start.momentum - self.gravity - self.ball - self.air - self.held
         return float(np.sqrt((rest * rest).sum()))
 
     def lost(self, now: State) -> float:
         """J that friction, the air, impacts and the springs' own damping took: what came in less what is there."""
-        return self.start.energy + self.work - now.energy
+        return self.start.energy + self.work + self.held_work - now.energy

@@ -13,15 +13,14 @@ import numpy as np
 
 from cloth_solver.queries import Near
 from cloth_solver.setup import Setup
-from hpccd_ros.scenes.exactmath import cross, dot
 
 
 @dataclass(frozen=True)
 class Pairs:
     """N pairs. With x (3,V): the gap along `normal` (3,N) is normal . sum of weight[k] * x[:, vertex[k]], k = 0 .. 3.
 
-    vertex (4,N): of vertex-face pairs the vertex and the face's three, of edge-edge pairs the two edges' ends.
-    compliant (N,): sum of weight^2 / mass; of_ball (N,): whether the ball is one of the two.
+    vertex, weight (4,N): as hpccd_core.Contacts names them, transposed.
+    compliant (N,): sum of weight^2 / mass; of_ball (N,): whether the ball or the plate is one of the two.
     """
 
     vertex: np.ndarray
@@ -66,36 +65,9 @@ class Pairs:
         return self.normal[0] * offset[0] + self.normal[1] * offset[1] + self.normal[2] * offset[2]
 
     @staticmethod
-    def of(near: Near, faces: np.ndarray, start: np.ndarray, end: np.ndarray, setup: Setup, n_cloth: int) -> Pairs:
-        """From a detector's result for the motion from `start` to `end` (V,3); faces (F,3) of the whole scene."""
-        vf, ee = near.vf.astype(np.int64), near.ee.astype(np.int64)
-        vertex = np.concatenate([np.column_stack([vf[:, 0], faces[vf[:, 1]]]), ee]).T.reshape(4, -1)
-        toc = np.concatenate([near.vf_toc, near.ee_toc])[:, None]
-        x = [(1.0 - toc) * start[v] + toc * end[v] for v in vertex]
-        n, weight = len(vf), np.empty(vertex.shape)
-        weight[0, :n] = 1.0
-        weight[1:, :n] = -_in_triangle(near.closest[:n, 1], *(corner[:n] for corner in x[1:]))
-        along_a, along_b = (
-            _on_segment(near.closest[n:, side], x[2 * side][n:], x[2 * side + 1][n:]) for side in (0, 1)
-        )
-        weight[:, n:] = along_a - 1.0, -along_a, 1.0 - along_b, along_b
-        of_ball = (vertex >= n_cloth).any(axis=0)
-        compliant = np.where(vertex < n_cloth, weight * weight, 0.0).sum(axis=0) / setup.mass
-        return Pairs(vertex, weight, np.ascontiguousarray(near.normals.T), compliant, of_ball)
-
-
-def _in_triangle(point, a, b, c):
-    """(3,N) barycentric coordinates of points (N,3) of triangles."""
-    u, v, w = b - a, c - a, point - a
-    normal = cross(u, v)
-    area = dot(normal, normal)
-    area = np.where(area > 0.0, area, 1.0)
-    of_b, of_c = dot(cross(w, v), normal) / area, dot(cross(u, w), normal) / area
-    return np.clip([1.0 - of_b - of_c, of_b, of_c], 0.0, 1.0)
-
-
-def _on_segment(point, a, b):
-    """(N,) from 0 at a to 1 at b."""
-    d = b - a
-    length = dot(d, d)
-    return np.clip(dot(point - a, d) / np.where(length > 0.0, length, 1.0), 0.0, 1.0)
+    def of(near: Near, setup: Setup, n_cloth: int) -> Pairs:
+        """From a detector's result, which has the vertices, weights and normals of each pair."""
+        vertex, weight = np.ascontiguousarray(near.vertices.T, np.int64), np.ascontiguousarray(near.weights.T)
+        movable = vertex < n_cloth
+        compliant = np.where(movable, weight * weight, 0.0).sum(axis=0) / setup.mass
+        return Pairs(vertex, weight, np.ascontiguousarray(near.normals.T), compliant, ~movable.all(axis=0))

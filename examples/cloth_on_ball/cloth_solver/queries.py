@@ -14,18 +14,15 @@ from cloth_solver.setup import Setup
 
 
 class Near(Protocol):
-    """Pairs within the separation: as hpccd_core.Contacts names them, with normals and closest points at their toc."""
+    """N pairs within the separation, at their time of impact, as in hpccd_core.Contacts."""
 
-    vf: np.ndarray
-    vf_toc: np.ndarray
-    ee: np.ndarray
-    ee_toc: np.ndarray
-    normals: np.ndarray
-    closest: np.ndarray
+    vertices: np.ndarray  # (N,4)
+    weights: np.ndarray  # (N,4)
+    normals: np.ndarray  # (N,3)
 
 
 class Queries:
-    """The three questions. Positions are (V,3) float32, the cloth's vertices first, then the ball's.
+    """The four questions. Positions are (V,3) float32, the cloth's vertices first, then those of the obstacles.
 
     seconds: spent in queries so far, with transport.
     """
@@ -39,6 +36,11 @@ class Queries:
 
     def free_part(self, start: np.ndarray, end: np.ndarray) -> float:
         """How much of the way is certainly free, with the setup's clearance kept; 1.0 for all of it."""
+        raise NotImplementedError
+
+    def free_motion(self, start: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(positions, factors): the end of a motion that is certainly free, with the setup's clearance kept, and how
+        much of its own motion each vertex keeps; the same for all of the ball."""
         raise NotImplementedError
 
     def intersections(self, positions: np.ndarray) -> int:
@@ -60,15 +62,19 @@ class Queries:
 class InProcess(Queries):
     """hpccd_core in this process. Two detectors, since each keeps boxes that fit its separation."""
 
-    def __init__(self, setup: Setup, cloth_faces: np.ndarray, ball_faces: np.ndarray, n_ball: int, threads: int = 0):
+    def __init__(self, setup: Setup, threads: int = 0):
         import hpccd_core
 
         super().__init__()
-        scene = hpccd_core.Scene()
-        scene.add_mesh("cloth", cloth_faces)
-        scene.add_mesh("ball", ball_faces, self_collision=False, n_vertices=n_ball)
+        scene, meshes = hpccd_core.Scene(), setup.meshes()
+        for mesh in meshes:
+            scene.add_mesh(mesh.name, mesh.faces, n_vertices=mesh.n_vertices, self_collision=mesh.self_collision)
+        for pair in setup.ignored_pairs:
+            scene.ignore_pair(*pair)
+        # -1: each vertex of the cloth has its own factor. Another number: all vertices of that mesh share one.
+        self._groups = np.repeat(np.arange(-1, len(meshes) - 1), [mesh.n_vertices for mesh in meshes])
         self._reaching = hpccd_core.Detector(
-            scene, minimum_separation=setup.reach, outputs=("normals", "closest"), threads=threads
+            scene, minimum_separation=setup.reach, outputs=("normals", "weights"), threads=threads
         )
         self._guarding = hpccd_core.Detector(scene, minimum_separation=setup.clearance, threads=threads)
 
@@ -79,6 +85,11 @@ class InProcess(Queries):
     def free_part(self, start, end):
         with self._timed():
             return self._guarding.collision_free_step(start, end)
+
+    def free_motion(self, start, end):
+        with self._timed():
+            motion = self._guarding.collision_free_motion(start, end, self._groups)
+        return motion.vertices, motion.factors
 
     def intersections(self, positions):
         with self._timed():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated scene: a square cloth above a spinning ball."""
+"""The simulated scenes: a square cloth above a spinning ball, or with a corner pinched between the ball and a plate."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ import numpy as np
 
 from hpccd_core import shapes
 from hpccd_ros.scenes.exactmath import axis_angle, random_stream, rotate
+from hpccd_ros.scenes.scene import Mesh
 
+# How far (m) a pinched corner extends beyond the top of the ball, along both sides of the cloth.
+PINCHED = 0.1
 # Largest small step times the frequency of a vertex on one spring.
 STIFFNESS = 0.8
 
@@ -36,6 +39,13 @@ class Setup:
     friction_ball: float = 0.8
     friction_cloth: float = 0.3
     period: float = 0.01  # of a move
+    has_plate: bool = False  # above the ball, at rest
+
+    @classmethod
+    def pinched(cls, cells: int, **others) -> Setup:
+        """A corner of the cloth lies between the ball and a plate that is closer than the thickness. The rest falls."""
+        middle = 0.5 * cls.side - PINCHED
+        return cls(cells, offset=(middle, middle), has_plate=True, **others)
 
     @property
     def spacing(self) -> float:
@@ -74,6 +84,11 @@ class Setup:
         ramp = min(time, self.spin_ramp)
         return self.spin * (0.5 * ramp * ramp / self.spin_ramp + (time - ramp))
 
+    @property
+    def plate_gap(self) -> float:
+        """Between the plate and the top of the ball: room for the clearance on both sides, not for the thickness."""
+        return 0.8 * self.thickness
+
     def ball(self):
         """(V,3) float64 vertices at time 0, (F,3) uint32 faces."""
         vertices, faces = shapes.icosphere(self.ball_frequency)
@@ -83,6 +98,27 @@ class Setup:
         """The ball's vertices at `time`."""
         return rotate(axis_angle(np.array([0.0, 0.0, 1.0]), self.angle(time)), ball)
 
+    def plate(self):
+        """(V,3) float64 vertices and (F,3) uint32 faces of the plate; none where there is no plate."""
+        vertices, faces = shapes.grid(1, 1)
+        vertices = vertices * (2.0 * PINCHED) + [0.0, 0.0, self.ball_radius + self.plate_gap]
+        return (vertices, faces) if self.has_plate else (vertices[:0], faces[:0])
+
+    def meshes(self) -> tuple[Mesh, ...]:
+        """The cloth and the obstacles, in the order of their vertices."""
+        (cloth, cloth_faces), (ball, ball_faces), (plate, plate_faces) = self.cloth(0), self.ball(), self.plate()
+        meshes = (
+            Mesh("cloth", cloth_faces, len(cloth)),
+            Mesh("ball", ball_faces, len(ball), self_collision=False),
+            Mesh("plate", plate_faces, len(plate), self_collision=False),
+        )
+        return meshes if self.has_plate else meshes[:2]
+
+    @property
+    def ignored_pairs(self) -> tuple[tuple[str, str], ...]:
+        """The ball and the plate are closer than the reach, and such pairs move no vertex of the cloth."""
+        return (("ball", "plate"),) if self.has_plate else ()
+
     def cloth(self, seed: int):
         """(V,3) float64 vertices at rest above the ball, (F,3) uint32 faces."""
         vertices, faces = shapes.grid(self.cells, self.cells)
@@ -91,5 +127,6 @@ class Setup:
         noise = 0.02 * self.spacing * random_stream(seed).random_sample(len(vertices))
         vertices[:, 0] += self.offset[0]
         vertices[:, 1] += self.offset[1]
-        vertices[:, 2] = self.ball_radius + self.drop_height + noise
+        height = 0.5 * self.plate_gap if self.has_plate else self.drop_height
+        vertices[:, 2] = self.ball_radius + height + noise
         return vertices, faces
