@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from compare_steps import SCENES, compared
 
 import hpccd_ros
 from hpccd_ros import cli
@@ -82,6 +83,15 @@ def test_a_pinched_corner_with_a_node_in_the_loop(tmp_path):
     for words in (("--npz", "here.npz"), ("--node", "--npz", "dds.npz")):
         run(tmp_path, *PINCHED, *words)
     check_same_frames(tmp_path / "here.npz", tmp_path / "dds.npz")
+
+
+@pytest.mark.parametrize("step", ["global", "vertices"])
+def test_the_comparison_of_steps_is_that_of_the_page(step):
+    """But for the frames a second."""
+    page = (ROOT / "docs" / "simulators.md").read_text()
+    shown = re.search(rf"^\| fast ball \| {step} \| (.*) \|$", page, re.MULTILINE)[1].split(" | ")
+    cells = compared(SCENES["fast ball"], step).split(" | ")
+    assert cells[:4] + cells[5:] == shown[:4] + shown[5:]
 
 
 @contextlib.contextmanager
