@@ -183,7 +183,10 @@ class Oracle:
         except ValueError:
             return NOT_THERE
         rows = self._rows(found, last)
-        told = list(zip(*(_columns(result, name) for name in FIELDS), strict=True))
+        try:
+            told = list(zip(*(_columns(result, name) for name in FIELDS), strict=True))
+        except ValueError:
+            return "arrays of different lengths"
         if report == "any":
             if bool(told) != bool(rows) or not set(told) <= set(rows):
                 return "no such contact"
@@ -226,7 +229,7 @@ def _ns(stamp) -> int:
 
 def _decode(store, data, type_name):
     try:
-        return store.deserialize_cdr(data, type_name)
+        return _texts_of_ros(store.deserialize_cdr(data, type_name))
     except (SerdeError, AssertionError):
         # rosbags takes no byte behind the message, and no text that is no UTF-8; ROS does.
         from rclpy.serialization import deserialize_message
@@ -234,6 +237,17 @@ def _decode(store, data, type_name):
         from hpccd_ros.middleware.message_types import message_class
 
         return _with_arrays(deserialize_message(data, message_class(type_name)))
+
+
+def _texts_of_ros(thing):
+    """ROS ends a text at its first NUL, rosbags does not."""
+    if isinstance(thing, str):
+        return thing.partition("\0")[0]
+    if isinstance(thing, list):
+        return [_texts_of_ros(entry) for entry in thing]
+    for field in getattr(thing, "__dataclass_fields__", ()):
+        object.__setattr__(thing, field, _texts_of_ros(getattr(thing, field)))
+    return thing
 
 
 def _with_arrays(message):
