@@ -39,6 +39,7 @@ copybutton_exclude = ".linenos, .gp, .go"
 
 # Python: numpydoc sections, and types by their short names.
 autodoc_typehints = "none"
+autodoc_mock_imports = ["jax", "torch"]  # extras
 autodoc_member_order = "bysource"
 maximum_signature_line_length = 100
 autodoc_default_options = {"members": True}

@@ -245,6 +245,7 @@ class Detector(
         self._shape = (self.n_vertices, 3) if self.worlds is None else (self.worlds, self.n_vertices, 3)
         self._rows = self.n_vertices * (self.worlds or 1)
         self._layout = scene.layout
+        self._n_mesh_pairs = scene._n_enabled_pairs()
         self._mesh_numbers = {name: number for number, name in enumerate(self._layout.mesh_names)}
         options = _core.Options()
         options.accuracy = getattr(_core.Accuracy, accuracy)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any, overload
 
@@ -177,6 +178,18 @@ class Scene:
         vars(self).update(state, _calls=[])
         for name, values in state["_calls"]:
             self._repeat(name, values)
+
+    def _n_enabled_pairs(self) -> int:
+        """How many pairs of meshes are tested, a mesh with itself included: by the rules of the core."""
+        moves: list[bool] = []
+        by_itself: list[bool] = []
+        for name, values in self._calls:
+            if name == "add_mesh":
+                moves.append(not values[4])
+                by_itself.append(values[3] and not values[4])
+        ignored = {tuple(sorted(values)) for name, values in self._calls if name == "ignore_pair"}
+        n_ignored: int = sum(by_itself[a] if a == b else moves[a] or moves[b] for a, b in ignored)
+        return math.comb(len(moves), 2) - math.comb(moves.count(False), 2) + sum(by_itself) - n_ignored
 
     def _number(self, name: str, mesh: MeshName) -> int:
         return arguments.mesh_number(name, mesh, self._ids)

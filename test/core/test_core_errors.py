@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each mistake gets an error that names the argument and says what to do; the detector goes on afterwards."""
 
+import importlib
 import sys
 from collections import UserList, deque
 
@@ -646,3 +647,13 @@ def test_long_doubles_beyond_float64(scene, detector):
 def test_contacts_of_step_takes_a_list(bad):
     with pytest.raises(TypeError, match=r"^results: expected a list of \(contacts, part, parts\), got"):
         contacts_of_step(bad)
+
+
+@pytest.mark.parametrize("package, name", [("torch", "PyTorch"), ("jax", "JAX")])
+def test_an_extra_that_is_absent(monkeypatch, package, name):
+    monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.delitem(sys.modules, f"hpccd_core.{package}", raising=False)
+    with pytest.raises(
+        ModuleNotFoundError, match=rf"^hpccd_core.{package}: cannot import {name} .*; pip install {package}$"
+    ):
+        importlib.import_module(f"hpccd_core.{package}")

@@ -144,6 +144,19 @@ def test_rules_of_scenes():
         assert_gaps(gaps, meshes, vertices, rules, size_of(vertices))
 
 
+def test_enabled_pairs_are_counted_before_a_query():
+    rng = np.random.default_rng(7)
+    for _ in range(40):
+        scene = hc.Scene()
+        n = int(rng.integers(0, 6))
+        for k, (own, static) in enumerate(rng.random((n, 2)) < 0.5):
+            scene.add_mesh(f"mesh{k}", [[0, 1, 2]], self_collision=bool(own), static=bool(static))
+        for a, b in rng.integers(0, max(n, 1), (int(rng.integers(0, 9)) if n else 0, 2)):
+            scene.ignore_pair(int(a), int(b))
+        detector = hc.Detector(scene, backend="cpu", threads=1)
+        assert detector._n_mesh_pairs == len(detector.distances(rng.normal(size=(3 * n, 3))))
+
+
 def test_a_single_triangle_has_no_pair_of_its_own():
     scene = hc.Scene()
     scene.add_mesh("mesh0", [[0, 1, 2]])

@@ -18,8 +18,13 @@ PUBLIC = {name: getattr(hc, name) for name in hc.__all__ if not name.startswith(
 PUBLIC |= {name: getattr(rigid, name) for name in rigid.__all__ if inspect.isfunction(getattr(rigid, name))}
 
 
+EXTRAS = {"hpccd_core.torch": "torch", "hpccd_core.jax": "jax"}  # modules, and the package that each needs
+
+
 @pytest.mark.parametrize("name", MODULES)
 def test_examples_run(name):
+    if name in EXTRAS:
+        pytest.importorskip(EXTRAS[name], reason=f"{name} needs the extra {EXTRAS[name]}")
     found = doctest.testmod(importlib.import_module(name), optionflags=doctest.ELLIPSIS)
     assert found.failed == 0
 
@@ -37,7 +42,8 @@ def test_what_is_compiled_is_documented_too(name):
 
 
 def test_the_examples_are_found():
-    tests = [t for name in MODULES for t in doctest.DocTestFinder().find(importlib.import_module(name)) if t.examples]
+    modules = set(MODULES) - set(EXTRAS)
+    tests = [t for name in modules for t in doctest.DocTestFinder().find(importlib.import_module(name)) if t.examples]
     assert {"Detector", "Scene", "Contacts", "icosphere"} <= {t.name.rpartition(".")[2] for t in tests}
 
 

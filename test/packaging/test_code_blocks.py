@@ -81,9 +81,10 @@ def runs(page: Path) -> list[Run]:
 
 
 def usable(program: str) -> bool:
-    """Not: programs of a node's clients, which test/client runs beside one, and of GPU libraries that are not here."""
-    on_device = [name for name in ("cupy", "torch", "warp") if f"import {name}" in program]
-    if on_device and not ("gpu" in hc.backends() and all(map(importlib.util.find_spec, on_device))):
+    """Not: programs of a node's clients, which test/client runs beside one; of a GPU and libraries that are absent."""
+    if 'results="device"' in program and "gpu" not in hc.backends():
+        return False
+    if not all(map(importlib.util.find_spec, re.findall(r"import (cupy|jax|torch|warp)\b", program))):
         return False
     return "client.prepare_environment()" not in program or program.startswith("# ")
 
