@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """collision_free_motion: nothing touches in it, and no vertex keeps less than a step of one length would leave it."""
 
+import dataclasses
+
 import numpy as np
+import oracle
 import pytest
 import random_scenes
 
@@ -52,8 +55,45 @@ def test_nothing_touches(generate, options):
         step = detector.collision_free_step(start, end)
         moved = (start != end).any(1)
         assert factors[moved].min(initial=1) >= 0.9 * step * (1 - 1e-9)
-        for other in ({"threads": 1, "simd": "scalar"}, {"report": "any"}, {"method": "published"}):
+        for other in ({"threads": 1, "simd": "scalar"}, {"threads": 5}, {"report": "any"}, {"method": "published"}):
             assert detector_of(meshes, **options, **other).collision_free_motion(start, end) == motion
+
+
+@SCENES
+@pytest.mark.parametrize("features", [("vertex_face",), ("edge_edge",), ("vertex_face", "edge_edge")], ids=str)
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("n", [1, pytest.param(12, marks=pytest.mark.long)])
+def test_by_the_exact_oracle(generate, features, dtype, n):
+    """With a static mesh, one that passes through another, one that passes through itself, and a separation."""
+    for seed in range(n):
+        rng = np.random.default_rng([47, seed])
+        meshes = generate(rng)
+        several = len(meshes.faces) > 1
+        rules = {"static": (1,), "ignored_pairs": ((0, 1),), "no_self_collision": (0,)} if several else {}
+        separations = np.full((len(meshes.faces),) * 2, rng.choice([0, 2.0**-5]))
+        start, end = meshes.vertices_t0.astype(dtype), meshes.vertices_t1.astype(dtype)
+        if several:
+            at_rest = np.repeat(np.arange(len(meshes.faces)) == 1, meshes.n_vertices)
+            end[at_rest] = start[at_rest]
+            separations[-1, 0] = separations[0, -1] = 2.0**-4
+        detector = hc.Detector(meshes.scene(**rules), backend="cpu", threads=2, features=features)
+        detector.set_separations(separations)
+        motion = detector.collision_free_motion(start, end)
+        found = oracle.brute_force(
+            start,
+            motion.vertices,
+            meshes.faces,
+            pair_separation=dict(np.ndenumerate(separations)),
+            threads=2,
+            **meshes.beside_faces,
+            **rules,
+        )
+        if "vertex_face" not in features:
+            found = dataclasses.replace(found, vf=found.vf[:0], vf_toc=found.vf_toc[:0])
+        if "edge_edge" not in features:
+            found = dataclasses.replace(found, ee=found.ee[:0], ee_toc=found.ee_toc[:0])
+        assert not found.vf_toc.any() and not found.ee_toc.any()
+        assert np.array_equal(np.unique(vertices_of(found, meshes)), motion.stuck)
 
 
 @SCENES

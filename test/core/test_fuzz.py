@@ -9,7 +9,7 @@ import pytest
 from fuzz import __main__ as command
 from fuzz import differential, questions, slowest
 from fuzz.generators import GENERATORS, VERTEX_FACE
-from fuzz.questions import CONTACT, DISTANCES, INTERSECTIONS, PROXIMITY, SEPARATION, STEP
+from fuzz.questions import CONTACT, DISTANCES, INTERSECTIONS, MOTION, PROXIMITY, SEPARATION, STEP
 
 import hpccd_core as hc
 
@@ -30,7 +30,9 @@ def n_batches(question):
         (INTERSECTIONS, 60, 1),
         (DISTANCES, 60, 1),
         (STEP, 25, 2),
+        (MOTION, 20, 1),
         pytest.param(STEP, 60, 2, marks=pytest.mark.long),
+        pytest.param(MOTION, 100, 4, marks=pytest.mark.long),
     ],
 )
 def test_promises_are_kept(question, size, rounds):
@@ -166,6 +168,43 @@ def test_wrong_steps_are_seen_saved_and_replayed(mistake, tmp_path, monkeypatch,
         patch.setattr(hc.Detector, method, getattr(Mistakes, mistake))
         arguments = ["--count", "300", "--batch", "30", "--simd", "auto", "--accuracy", "exact,conservative"]
         assert command.main([*arguments, "--question", STEP, "--save", str(saved)]) == 1
+    with np.load(saved) as file:
+        assert {key.split("|")[1] for key in file.files} == {"exact", "conservative"}
+    assert command.main(["--replay", str(saved), "--accuracy", "exact", "--save", str(tmp_path / "again.npz")]) == 0
+
+
+def whole(start, end, motion):
+    """The most shortened vertices are not."""
+    too_far = motion.factors == motion.factors.min(initial=1)
+    vertices = np.where(too_far[:, None], end, motion.vertices).astype(motion.vertices.dtype)
+    return dataclasses.replace(motion, vertices=vertices, factors=np.where(too_far, 1, motion.factors))
+
+
+def short(start, end, motion):
+    factors = motion.factors / 4
+    vertices = (start + factors[:, None] * (end.astype(float) - start)).astype(start.dtype)
+    return dataclasses.replace(motion, vertices=vertices, factors=factors)
+
+
+def one_is_free(start, end, motion):
+    return dataclasses.replace(motion, stuck=motion.stuck[1:])
+
+
+def nearby(start, end, motion):
+    return dataclasses.replace(motion, factors=motion.factors * (1 - 1e-9))
+
+
+@pytest.mark.parametrize("mistake", [whole, short, one_is_free, nearby])
+def test_wrong_motions_are_seen_saved_and_replayed(mistake, tmp_path, monkeypatch, capsys):
+    saved = tmp_path / "failures.npz"
+    with monkeypatch.context() as patch:
+
+        def wrong(self, start, end, groups):
+            return mistake(start, end, super(hc.Detector, self).collision_free_motion(start, end, groups))
+
+        patch.setattr(hc.Detector, "collision_free_motion", wrong)
+        arguments = ["--count", "100", "--batch", "20", "--simd", "auto", "--accuracy", "exact,conservative"]
+        assert command.main([*arguments, "--question", MOTION, "--save", str(saved)]) == 1
     with np.load(saved) as file:
         assert {key.split("|")[1] for key in file.files} == {"exact", "conservative"}
     assert command.main(["--replay", str(saved), "--accuracy", "exact", "--save", str(tmp_path / "again.npz")]) == 0

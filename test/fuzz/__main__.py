@@ -52,8 +52,8 @@ def main(arguments: list[str] | None = None) -> int:
     console.print(_table(tallies))
     console.print(
         "error: largest error of a time, or of a distance in sizes of its query; true: hits, or scenes in which meshes "
-        "touch; late: largest beyond the true one; uneven:\nan instruction set, or a query of the same step, differs; "
-        "broken: promises of exact and conservative, and what is uneven."
+        "touch; late: largest beyond the true one; uneven:\nan instruction set, or a query of the same step, differs, "
+        "or a motion breaks a promise; broken: promises of exact and conservative, and what is uneven."
     )
     source_text = f"replay of {a.replay}" if a.replay else f"seed {a.seed}, batches of {a.batch}"
     seconds = time.monotonic() - start
@@ -68,10 +68,11 @@ def _parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="python -m fuzz",
         description="Compare contact, separation, proximity and intersections of single pairs, and of small scenes the "
-        "smallest distances of their meshes and how far they may go, with the exact oracle on degenerate queries. Exit "
-        "status 1 where exact differs (time or distance: by more than 1e-12), where conservative misses a pair, "
-        "reports it late or, where distances count, differs in the same way, where either lets a scene go too far or "
-        "ends it more than 1e-9 too early, where report='first' is not the earliest contacts of 'all', or where an "
+        "smallest distances of their meshes, how far they may go and their collision-free motions, with the exact "
+        "oracle on degenerate queries. Exit status 1 where exact differs (time or distance: by more than 1e-12), where "
+        "conservative misses a pair, reports it late or, where distances count, differs in the same way, where either "
+        "lets a scene go too far or ends it more than 1e-9 too early, where a collision-free motion touches anything "
+        "or keeps less than promised, where report='first' is not the earliest contacts of 'all', or where an "
         "instruction set's result differs; fast and balanced promise no more and are only counted.",
     )
     length = p.add_mutually_exclusive_group()

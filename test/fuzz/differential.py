@@ -12,11 +12,12 @@ import numpy as np
 import hpccd_core as hc
 
 from . import questions
-from .questions import CONTACT, DISTANCES, INTERSECTIONS, PROXIMITY, SEPARATION, STEP, Batch, Results
+from .motions import break_promises
+from .questions import CONTACT, DISTANCES, INTERSECTIONS, MOTION, PROXIMITY, SEPARATION, STEP, Batch, Results
 from .steps import EARLY, contradict
 
 SIMD = ("scalar", "avx2", "avx512", "neon")
-QUESTIONS = (CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS, DISTANCES, STEP)
+QUESTIONS = (CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS, DISTANCES, STEP, MOTION)
 
 # Guarantee of `exact`: error of the time; error of the distance, relative to the size of the query.
 TOLERANCE = 1e-12
@@ -36,7 +37,9 @@ class Disagreement:
     missed: np.ndarray
     invented: np.ndarray
     late: np.ndarray
-    uneven: np.ndarray  # instruction sets, or queries of the same step, that should agree to the bit do not
+    uneven: (
+        np.ndarray
+    )  # instruction sets or queries of a step that should be bit-identical differ; or a motion is wrong
     question: str = CONTACT
 
     def broken_promises(self, accuracy: str) -> np.ndarray:
@@ -44,6 +47,8 @@ class Disagreement:
 
         `fast` and `balanced` guarantee only the same result with all instruction sets.
         """
+        if self.question == MOTION and accuracy in ("exact", "conservative"):
+            return self.uneven | self.missed | self.invented
         if self.question == STEP and accuracy in ("exact", "conservative"):
             return self.uneven | self.invented | ~((self.late <= 0) & (self.late >= -EARLY))
         if accuracy == "exact":
@@ -109,10 +114,10 @@ def compare(batch: Batch, accuracy: str, simd: Sequence[str], truth: Results) ->
     true_hit, true_value = truth
     (hit, value), *others = (questions.results(batch, accuracy, s) for s in simd)
     # A distance of meshes is told whether or not they touch; it is infinite where they have no pair of features.
-    # A step is told where nothing touches too.
-    always = batch.question in (DISTANCES, STEP)
+    # A step is told where nothing touches too, and a smallest factor.
+    always = batch.question in (DISTANCES, STEP, MOTION)
     told = np.ones_like(hit) if always else hit
-    largest = 1.0 if batch.question in (CONTACT, SEPARATION, STEP) else np.inf
+    largest = 1.0 if batch.question in (CONTACT, SEPARATION, STEP, MOTION) else np.inf
     if not ((value[told] >= 0) & (value[told] <= largest)).all():
         raise AssertionError(f"{accuracy} {batch.question} {batch.kind}: value out of range: {value[told][:5]}")
     uneven = np.zeros(hit.shape, bool)
@@ -127,6 +132,9 @@ def compare(batch: Batch, accuracy: str, simd: Sequence[str], truth: Results) ->
         missed &= true_value < 1  # a contact just at the end
         for s in simd:
             uneven |= contradict(batch.kind, batch.queries, batch.distances, accuracy, s)
+    if batch.question == MOTION:  # the value is a factor, to which others than the true step may be right
+        late[:] = np.nan
+        uneven |= break_promises(batch.kind, batch.queries, batch.distances, accuracy, simd, true_value)
     if batch.question == DISTANCES:  # of several results for each scene the worst
         worst = np.abs(late).argmax(axis=1)[:, None]
         late = np.take_along_axis(late, worst, axis=1)[:, 0]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Queries to the core and the oracle: contact, separation, proximity and intersections of single pairs; distances and
-collision-free steps of small scenes."""
+"""Queries to the core and the oracle: contact, separation, proximity and intersections of single pairs; distances,
+collision-free steps and collision-free motions of small scenes."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ import hpccd_core as hc
 from .disturbances import disturb, disturb_near
 from .gaps import GAP_POINTS, TOPOLOGIES, core_gaps, true_gaps
 from .generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
+from .motions import FREE_MOTIONS, core_motions
 from .near_generators import NEAR_GENERATORS
 from .snapshots import EDGE_FACE, EDGE_FACE_POINTS, SNAPSHOTS
 from .steps import STEP_MOTIONS, core_steps, true_steps
 
 CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS = "contact", "separation", "proximity", "intersections"
-DISTANCES, STEP = "distances", "step"
-OF_SCENES = (DISTANCES, STEP)
+DISTANCES, STEP, MOTION = "distances", "step", "motion"
+OF_SCENES = {DISTANCES: TOPOLOGIES, STEP: STEP_MOTIONS, MOTION: FREE_MOTIONS}  # by question, their kinds
 PAIRS_OF_A_SCENE = 10  # a batch has a tenth as many scenes as single pairs: each scene has dozens of pairs
 
 # hit (Q,) bool; value (Q,) float64: time, distance, or 0. Distances (Q,N): several results for each scene.
@@ -45,7 +46,7 @@ class Batch:
 
 def kinds_of(question: str) -> tuple[str, ...]:
     if question in OF_SCENES:
-        return tuple(TOPOLOGIES if question == DISTANCES else STEP_MOTIONS)
+        return tuple(OF_SCENES[question])
     return (EDGE_FACE,) if question == INTERSECTIONS else (VERTEX_FACE, EDGE_EDGE)
 
 
@@ -57,11 +58,13 @@ def generators_of(question: str, kind: str) -> dict[str, Callable]:
         INTERSECTIONS: {EDGE_FACE: EDGE_FACE_POINTS},
         DISTANCES: dict.fromkeys(TOPOLOGIES, GAP_POINTS),
         STEP: STEP_MOTIONS,
+        MOTION: FREE_MOTIONS,
     }[question][kind]
 
 
 def generated(question: str, kind: str, generator: str, rng: np.random.Generator, size: int) -> Batch:
-    size = max(1, size // PAIRS_OF_A_SCENE) if question in OF_SCENES else size
+    if question in OF_SCENES and kind not in GENERATORS:
+        size = max(1, size // PAIRS_OF_A_SCENE)
     made = generators_of(question, kind)[generator](rng, size)
     if question == CONTACT:
         made = disturb(rng, made, kind)
@@ -75,7 +78,7 @@ def truth(batch: Batch, threads: int = 0) -> Results:
     """The oracle's results, on `threads` threads."""
     if batch.question == DISTANCES:
         return true_gaps(batch.kind, batch.queries)
-    if batch.question == STEP:
+    if batch.question in (STEP, MOTION):
         return true_steps(batch.kind, batch.queries, batch.distances, threads)
     vertex_face = batch.kind == VERTEX_FACE
     if batch.question == CONTACT:
@@ -98,6 +101,8 @@ def results(batch: Batch, accuracy: str, simd: str) -> Results:
         return core_gaps(batch.kind, batch.queries, accuracy, simd)
     if batch.question == STEP:
         return core_steps(batch.kind, batch.queries, batch.distances, accuracy, simd)
+    if batch.question == MOTION:
+        return core_motions(batch.kind, batch.queries, batch.distances, accuracy, simd)
     return _of_snapshots(batch, accuracy, simd)
 
 

@@ -92,7 +92,50 @@ def apart(rng: np.random.Generator, n: int, scene: SmallScene) -> np.ndarray:
     return _between(ends[0], ends[1] + rng.normal(0, 3, (n, 1, 3)))
 
 
+def together(rng: np.random.Generator, n: int, scene: SmallScene) -> np.ndarray:
+    """All vertices, or each mesh, by one vector: at rest relative to each other but for rounding."""
+    start = _squeezed(rng, n, scene)
+    way = rng.normal(0, 1, (n, 1, 3)) * rng.choice([1, 1e3, 1e9], (n, 1, 1))
+    of_mesh = np.repeat(rng.normal(0, 1, (n, len(scene.n_vertices), 3)), scene.n_vertices, axis=1)
+    return _between(start, start + np.where(rng.random((n, 1, 1)) < 0.5, way, of_mesh))
+
+
+def pressed(rng: np.random.Generator, n: int, scene: SmallScene) -> np.ndarray:
+    """From nearly flat, down by ever more upwards: each layer runs into the next."""
+    start = _squeezed(rng, n, scene)
+    depth = 10.0 ** rng.uniform(-9, 0.5, (n, 1)) * (scene.rest[:, 2] - scene.rest[:, 2].min())
+    end = start + rng.normal(0, 1, (n, *scene.rest.shape)) * 10.0 ** rng.uniform(-12, -1, (n, 1, 1))
+    end[..., 2] -= depth
+    return _between(start, end)
+
+
+def sliding(rng: np.random.Generator, n: int, scene: SmallScene) -> np.ndarray:
+    """In the planes of the layers, which stay as near as they are."""
+    start = _squeezed(rng, n, scene)
+    way = np.repeat(rng.normal(0, 1, (n, len(scene.n_vertices), 3)), scene.n_vertices, axis=1)
+    way += rng.normal(0, 0.1, (n, *scene.rest.shape)) * rng.choice([0, 1], (n, 1, 1))
+    return _between(start, start + way * [1, 1, 0])
+
+
+def alone(rng: np.random.Generator, n: int, scene: SmallScene) -> np.ndarray:
+    """One vertex moves."""
+    q = noise(rng, n, scene)
+    q[:, : len(scene.rest)] = start = _squeezed(rng, n, scene)
+    moves = rng.integers(0, len(scene.rest), n) == np.arange(len(scene.rest))[:, None]
+    q[:, len(scene.rest) :] = np.where(moves.T[..., None], q[:, len(scene.rest) :], start)
+    return q
+
+
+def _squeezed(rng: np.random.Generator, n: int, scene: SmallScene) -> np.ndarray:
+    """At rest, some flattened until layers are 1e-16 apart, some without any order."""
+    rest = scene.rest * np.where(
+        rng.random((n, 1, 1)) < 0.5, [1, 1, 1e-9], 10.0 ** rng.uniform([0, 0, -16], 0, (n, 1, 3))
+    )
+    return rest + rng.normal(0, 1, rest.shape) * rng.choice([0, 0, 1e-12, 0.05], (n, 1, 1))
+
+
 MOTIONS: dict[str, Motions] = {f.__name__: f for f in (noise, thrown, wound, bent, folded, lattice, apart)}
+MORE_MOTIONS = MOTIONS | {f.__name__: f for f in (together, pressed, sliding, alone)}
 
 
 def extreme(rng: np.random.Generator, q: np.ndarray) -> np.ndarray:
@@ -109,7 +152,7 @@ def motions_of(scene: SmallScene, name: str) -> Callable[[np.random.Generator, i
     are 0."""
 
     def generate(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-        made = MOTIONS[name](rng, n, scene)
+        made = MORE_MOTIONS[name](rng, n, scene)
         for change, share in DISTURBANCES:
             chosen = rng.random(n) < share
             made[chosen] = change(rng, made[chosen])

@@ -112,3 +112,10 @@ SMALL_SCENES = {
     "careless": scene(careless()),
     "layers": scene(grid(2, 4), grid(3, 2), grid(2, 2), apart=0.25),
 }
+
+# With these, chains of motions that stop each other, and single pairs whose points are degenerate queries.
+MOTION_SCENES = SMALL_SCENES | {
+    "pile": scene(*[grid(2, 2)] * 8, apart=0.125),
+    "vertex-face": SmallScene([np.array([[1, 2, 3]])], [np.empty((0, 2), int)], [4], np.eye(4, 3)),
+    "edge-edge": SmallScene([np.empty((0, 3), int)], [np.array([[0, 1], [2, 3]])], [4], np.eye(4, 3)),
+}

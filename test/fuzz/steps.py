@@ -15,7 +15,7 @@ import hpccd_core as hc
 from hpccd_core.options import FEATURES
 
 from .step_motions import MOTIONS, motions_of
-from .step_scenes import SMALL_SCENES
+from .step_scenes import MOTION_SCENES, SMALL_SCENES
 
 # Guarantee of `exact` and `conservative`: the step ends at most this much before the true time.
 EARLY = 1e-9
@@ -26,8 +26,8 @@ STEP_MOTIONS = {kind: {name: motions_of(scene, name) for name in MOTIONS} for ki
 
 def true_steps(kind: str, queries: np.ndarray, distances: np.ndarray, threads: int) -> tuple[np.ndarray, np.ndarray]:
     """hit: whether there is a contact; value: the collision-free step; queries: (Q,2V,3)."""
-    scene = SMALL_SCENES[kind]
-    starts, ends = _ends(queries)
+    scene = MOTION_SCENES[kind]
+    starts, ends = ends_of(queries)
     toc = oracle.earliest_contacts(
         starts,
         ends,
@@ -44,7 +44,7 @@ def core_steps(
     kind: str, queries: np.ndarray, distances: np.ndarray, accuracy: str, simd: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """The same by the core, which tells a contact just at the end from none by detection only: hit is below 1."""
-    starts, ends = _ends(queries)
+    starts, ends = ends_of(queries)
     ask = _Asked(kind, accuracy, simd)
     steps = np.array([ask.step(*scene) for scene in zip(starts, ends, distances, strict=True)])
     return steps < 1, steps
@@ -55,7 +55,7 @@ def contradict(kind: str, queries: np.ndarray, distances: np.ndarray, accuracy: 
     end at their time; it differs when the start repeats; or, if only one kind of feature is tested, contacts and step
     differ from those of this kind in the full result."""
     ask = _Asked(kind, accuracy, simd)
-    starts, ends = _ends(queries)
+    starts, ends = ends_of(queries)
     return np.array([not ask.agrees(*scene) for scene in zip(starts, ends, distances, strict=True)], bool)
 
 
@@ -124,7 +124,7 @@ def is_alone(alone: hc.Contacts, feature: str, every: hc.Contacts) -> bool:
     return True
 
 
-def _ends(queries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def ends_of(queries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     half = queries.shape[1] // 2
     return np.ascontiguousarray(queries[:, :half]), np.ascontiguousarray(queries[:, half:])
 
