@@ -19,7 +19,7 @@ set(hpccd_sources
   src/traverse/leaf_edge_faces.cpp src/traverse/leaf_hulls.cpp src/traverse/leaf_pairs.cpp src/traverse/mesh_pairs.cpp
   src/traverse/less_excess.cpp src/traverse/near_corners.cpp src/traverse/nearest_pairs.cpp
   src/traverse/pair_pool.cpp src/traverse/snapshot_search.cpp src/traverse/worker.cpp
-  src/contacts/canonical.cpp src/contacts/gaps.cpp src/contacts/intersections.cpp src/contacts/nearest_points.cpp
+  src/contacts/canonical.cpp src/contacts/gaps.cpp src/contacts/intersections.cpp
   src/contacts/order.cpp src/contacts/parts.cpp src/contacts/places.cpp src/contacts/worlds.cpp
   src/paper/build.cpp src/paper/front.cpp src/paper/front_based.cpp src/paper/hierarchy.cpp
   src/paper/high_level.cpp src/paper/method.cpp src/paper/naive.cpp src/paper/primitive_pairs.cpp

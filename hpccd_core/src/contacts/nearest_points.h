@@ -57,6 +57,4 @@ HPCCD_HD NearestPoints nearest_points(const Vec3<double> t0[4], const Vec3<doubl
   return {distance, q[0] + found.x * now.a, q[2] - found.y * now.b, direction, {found.x, found.y}, certain};
 }
 
-NearestPoints nearest_points(const UndecidedPair& pair, double time);
-
 }  // namespace hpccd

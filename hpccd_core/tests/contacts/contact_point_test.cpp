@@ -23,7 +23,7 @@ struct Moving {
 PairPlaces places_of(Kind kind, const Moving& q, double toc) {
   UndecidedPair pair{kind, {}, {}, 0};
   for (int i = 0; i < 4; ++i) pair.t0[i] = q.t0[i], pair.t1[i] = q.t1[i];
-  return pair_places(pair, toc, {true, true, false, AtTime::contact});
+  return pair_places(pair, toc, {true, true, false, false, AtTime::contact});
 }
 
 // Steps of any length: the shorter, the more often the side at t = 0 is not that before the contact.

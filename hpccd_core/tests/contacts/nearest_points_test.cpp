@@ -20,6 +20,12 @@ UndecidedPair still(Kind kind, const V q[4]) {
   return pair;
 }
 
+NearestPoints nearest_points(const UndecidedPair& pair, double time) {
+  ByIntegers integers;
+  return pair.kind == Kind::vertex_face ? hpccd::nearest_points<Kind::vertex_face>(pair.t0, pair.t1, time, integers)
+                                        : hpccd::nearest_points<Kind::edge_edge>(pair.t0, pair.t1, time, integers);
+}
+
 double length(const V& v) { return std::hypot(v.x, v.y, v.z); }
 
 // From a place to a feature: the vertex, the face, or an edge, as degenerate faces.

@@ -57,9 +57,9 @@ TEST_P(PlacesOf, WhatDevicesDoNotLeaveOpenIsWhatCpusSay) {
   for (int i = 0; i < 20000; ++i) {
     const UndecidedPair q = i % 2 ? random_pair(kind, separation, random) : degenerate_pair(kind, separation, random);
     const double toc = exact::earliest_contact(kind, q.t0, q.t1).value_or(0.375);
-    for (int asked = 0; asked < 8; ++asked)
+    for (int asked = 0; asked < 16; ++asked)
       for (const AtTime at : {AtTime::contact, AtTime::start}) {
-        const Outputs outputs{(asked & 1) != 0, (asked & 2) != 0, (asked & 4) != 0, at};
+        const Outputs outputs{(asked & 1) != 0, (asked & 2) != 0, (asked & 4) != 0, (asked & 8) != 0, at};
         const Asked device = as_on_devices(q, toc, outputs);
         ++(device.open ? open : closed);
         if (asked == 1 && separation == 0)
@@ -84,7 +84,7 @@ TEST_P(PlacesOf, LittleIsOpenOfFeaturesInGeneralPosition) {
     // With a separation: apart, which the time of contact is not.
     const double time = separation > 0 ? 0.5 * *toc : *toc;
     ++contacts;
-    open += as_on_devices(q, time, {true, true, separation > 0, AtTime::contact}).open;
+    open += as_on_devices(q, time, {true, true, separation > 0, true, AtTime::contact}).open;
   }
   EXPECT_GT(contacts, 1000);
   EXPECT_LT(open, 0.02 * contacts);

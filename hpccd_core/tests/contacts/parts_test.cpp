@@ -15,6 +15,8 @@ namespace {
 struct Said {
   double toc;
   std::array<double, 3> point;
+  std::array<double, 4> weights;
+  double approach;
 };
 template <std::size_t n>
 using Pairs = std::map<std::array<std::uint32_t, n>, Said>;
@@ -28,15 +30,25 @@ Pairs<n> random_pairs(std::mt19937_64& random, std::size_t most) {
     std::array<std::uint32_t, n> pair;
     for (auto& feature : pair)
       feature = static_cast<std::uint32_t>(random() % 8) + (random() % 9 == 0 ? 0x80000000u : 0);
-    pairs[pair] = {real(random), {real(random), real(random), real(random)}};
+    pairs[pair] = {real(random),
+                   {real(random), real(random), real(random)},
+                   {real(random), real(random), real(random), real(random)},
+                   -real(random)};
   }
   return pairs;
 }
 
 struct Part {
   Contacts contacts;
+  template <std::size_t n>
+  void add(const std::array<std::uint32_t, n>& pair, const Said& said) {
+    contacts.points.push_back(said.point), contacts.weights.push_back(said.weights);
+    contacts.approach.push_back(said.approach);
+    contacts.vertices.push_back({pair[0], pair[1], pair[n - 2], pair[n - 1]});
+  }
   ContactsOfPart of(double part, double parts) const {
-    return {contacts.vf, contacts.vf_toc, contacts.ee, contacts.ee_toc, contacts.points, {}, {}, part, parts};
+    const Contacts& c = contacts;
+    return {c.vf, c.vf_toc, c.ee, c.ee_toc, c.points, {}, {}, c.vertices, c.weights, c.approach, part, parts};
   }
 };
 
@@ -44,11 +56,11 @@ Part part_of(const Pairs<2>& vf, const Pairs<4>& ee) {
   Part part;
   for (const auto& [pair, said] : vf) {
     part.contacts.vf.push_back(pair), part.contacts.vf_toc.push_back(said.toc);
-    part.contacts.points.push_back(said.point);
+    part.add(pair, said);
   }
   for (const auto& [pair, said] : ee) {
     part.contacts.ee.push_back(pair), part.contacts.ee_toc.push_back(said.toc);
-    part.contacts.points.push_back(said.point);
+    part.add(pair, said);
   }
   return part;
 }
@@ -66,6 +78,7 @@ TEST(PartsOfAStep, TellOfEachPairWhatTheFirstOfThemSays) {
         const auto ee_of_part = random_pairs<4>(random, most);
         const auto in_step = [&](Said said) {
           said.toc = (k + said.toc) / parts;
+          said.approach *= parts;  // per step
           return said;
         };
         for (const auto& [pair, said] : vf_of_part) vf.emplace(pair, in_step(said));
@@ -79,6 +92,9 @@ TEST(PartsOfAStep, TellOfEachPairWhatTheFirstOfThemSays) {
       EXPECT_EQ(found.ee, wanted.ee);
       EXPECT_EQ(found.ee_toc, wanted.ee_toc);
       EXPECT_EQ(found.points, wanted.points);
+      EXPECT_EQ(found.vertices, wanted.vertices);
+      EXPECT_EQ(found.weights, wanted.weights);
+      EXPECT_EQ(found.approach, wanted.approach);
       EXPECT_TRUE(found.normals.empty() && found.closest.empty());
       EXPECT_EQ(found.hash,
                 hash_of_contacts(ContactsOfPart{wanted.vf, wanted.vf_toc, wanted.ee, wanted.ee_toc, {}, {}, {}}));
@@ -94,9 +110,12 @@ TEST(PartsOfAStep, RefuseContactsOfUnequalLengths) {
   const std::vector<std::array<std::uint32_t, 2>> vf(2);
   const std::vector<double> toc(1);
   const std::vector<std::array<double, 3>> points(1);
-  const ContactsOfPart short_times{vf, toc, {}, {}, {}, {}, {}},
-      short_points{{vf.data(), 2}, {}, {}, {}, points, {}, {}};
-  for (const ContactsOfPart& bad : {short_times, short_points}) {
+  const std::vector<double> times(2);
+  ContactsOfPart short_times, short_points, short_approach;
+  short_times.vf = short_points.vf = short_approach.vf = vf;
+  short_times.vf_toc = toc, short_points.vf_toc = short_approach.vf_toc = times;
+  short_points.points = points, short_approach.approach = toc;
+  for (const ContactsOfPart& bad : {short_times, short_points, short_approach}) {
     EXPECT_THROW(contacts_of_step({&bad, 1}), InvalidArgument);
     EXPECT_THROW(hash_of_contacts(bad), InvalidArgument);
   }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points, normals and nearest points of contacts: with a separation between the features, without one where they meet.
+// Points, normals, nearest points and weights of contacts: with a separation between the features, without one where
+// they meet.
 #include "contacts/places.h"
 
 #include <gtest/gtest.h>
@@ -14,12 +15,13 @@ using V = Vec3<double>;
 V at(const std::array<double, 3>& x) { return {x[0], x[1], x[2]}; }
 
 Contacts detect(const std::vector<V>& t0, const std::vector<V>& t1, std::vector<std::uint32_t> faces, double separation,
-                bool points = true, bool normals = true, bool closest = true) {
+                bool points = true, bool normals = true, bool closest = true, bool weights = true) {
   auto scene = std::make_shared<Scene>();
   scene->add_mesh("pair", faces, static_cast<std::uint32_t>(t0.size()), {});
   Options options;
   options.backend = Backend::cpu, options.threads = 1, options.minimum_separation = separation;
   options.points = points, options.normals = normals, options.closest = closest;
+  options.weights = weights;
   return Detector(scene, options).detect({t0.data(), t0.size()}, {t1.data(), t1.size()});
 }
 
@@ -67,13 +69,16 @@ TEST(Places, AtNoDistanceAreThoseOfPlainContact) {
 TEST(Places, OnlyWhatIsAskedForIsThere) {
   const Contacts every = detect(above, lower, {1, 2, 3}, 2);
   ASSERT_EQ(every.vf.size(), 1u);
-  for (int asked = 0; asked < 8; ++asked) {
-    const bool points = asked & 1, normals = asked & 2, closest = asked & 4;
-    const Contacts c = detect(above, lower, {1, 2, 3}, 2, points, normals, closest);
+  for (int asked = 0; asked < 16; ++asked) {
+    const bool points = asked & 1, normals = asked & 2, closest = asked & 4, weights = asked & 8;
+    const Contacts c = detect(above, lower, {1, 2, 3}, 2, points, normals, closest, weights);
     EXPECT_EQ(c.hash, every.hash);
     EXPECT_EQ(c.points, points ? every.points : decltype(c.points){});
     EXPECT_EQ(c.normals, normals ? every.normals : decltype(c.normals){});
     EXPECT_EQ(c.closest, closest ? every.closest : decltype(c.closest){});
+    EXPECT_EQ(c.vertices, weights ? every.vertices : decltype(c.vertices){});
+    EXPECT_EQ(c.weights, weights ? every.weights : decltype(c.weights){});
+    EXPECT_EQ(c.approach, weights ? every.approach : decltype(c.approach){});
   }
 }
 

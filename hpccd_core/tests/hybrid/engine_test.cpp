@@ -38,7 +38,7 @@ struct Bench {
 
   Contacts collect() {
     Contacts contacts;
-    collect_contacts(workers, search.geometry, Report::all, {false, false, false, AtTime::contact}, order, pool,
+    collect_contacts(workers, search.geometry, Report::all, {false, false, false, false, AtTime::contact}, order, pool,
                      contacts);
     return contacts;
   }
