@@ -9,7 +9,7 @@ from fuzz.differential import usable_simd
 
 import hpccd_core as hc
 
-OUTPUTS = ("points", "normals", "closest")
+OUTPUTS = ("points", "normals", "closest", "weights")
 ARRAYS = (
     "vf",
     "vf_toc",
@@ -18,6 +18,9 @@ ARRAYS = (
     "points",
     "normals",
     "closest",
+    "vertices",
+    "weights",
+    "approach",
     "vf_distance",
     "ee_distance",
     "ef",
@@ -27,8 +30,11 @@ ARRAYS = (
 def as_bytes(result):
     """All that a result holds."""
     if isinstance(result, list):
+        arrays = ("points", "vertices", "weights", "normal")
         return [
-            (g.mesh_a, g.mesh_b, float(g.distance).hex(), g.kind, tuple(g.features), g.points.tobytes()) for g in result
+            (g.mesh_a, g.mesh_b, float(g.distance).hex(), g.kind, tuple(g.features))
+            + tuple(getattr(g, name).tobytes() for name in arrays)
+            for g in result
         ]
     arrays = {name: getattr(result, name) for name in ARRAYS if hasattr(result, name)}
     return result.hash, {name: (a.shape, a.dtype.str, a.tobytes()) for name, a in arrays.items()}

@@ -38,7 +38,7 @@ def meshes():
 @pytest.mark.parametrize("method", ["default", "published", "naive", "front"])
 def test_calls_take_turns(meshes, method):
     frames = meshes.vertices_t0, meshes.vertices_t1
-    options = {"accuracy": "balanced", "threads": 2, "method": method, "outputs": ("points", "normals")}
+    options = {"accuracy": "balanced", "threads": 2, "method": method, "outputs": ("points", "normals", "weights")}
     alone, detector = (hc.Detector(meshes.scene(), **options) for _ in range(2))
     expected = [alone.detect(*frames), alone.detect(*frames[::-1])]
     done = threading.Event()
@@ -47,7 +47,8 @@ def test_calls_take_turns(meshes, method):
         for k in range(40):
             found, right = detector.detect(*frames[:: 1 - 2 * ((turn + k) % 2)]), expected[(turn + k) % 2]
             assert found.hash == right.hash
-            np.testing.assert_array_equal(found.points, right.points)
+            for name, array in right.outputs.items():
+                np.testing.assert_array_equal(found.outputs[name], array, err_msg=name)
 
     def calls():
         try:

@@ -12,7 +12,7 @@ from many_worlds import assert_contacts, assert_gaps, assert_intersections, asse
 import hpccd_core as hc
 
 BACKENDS = pytest.mark.parametrize("backend", [*hc.backends(), "auto"])
-ALL_OUTPUTS = ("points", "normals", "closest")
+ALL_OUTPUTS = ("points", "normals", "closest", "weights")
 
 
 def assert_steps(worlds, backend="cpu", threads=2, steps=3, **options):

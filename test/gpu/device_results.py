@@ -6,7 +6,8 @@ import scenes
 
 import hpccd_core as hc
 
-ARRAYS = ("vf", "vf_toc", "ee", "ee_toc", "vf_distance", "ee_distance", "ef", "points", "normals", "closest")
+OUTPUTS = ("points", "normals", "closest", "vertices", "weights", "approach")
+ARRAYS = ("vf", "vf_toc", "ee", "ee_toc", "vf_distance", "ee_distance", "ef", *OUTPUTS)
 OFFSETS = ("vf_offsets", "ee_offsets", "ef_offsets", "first_tocs")
 
 

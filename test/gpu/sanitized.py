@@ -81,7 +81,7 @@ for report in ("all", "first"):
     check("sheet", *sheet, report=report)
     check("lattice", *lattice, report=report)  # by integers
     check("worlds", *device_results.garments(3, n=7), worlds=3, report=report)
-check("places", *sheet, outputs=("points", "normals", "closest"))
+check("places", *sheet, outputs=("points", "normals", "closest", "weights"))
 for accuracy in ("fast", "balanced"):
     check("worlds", *device_results.garments(4, n=7), worlds=4, accuracy=accuracy)
 

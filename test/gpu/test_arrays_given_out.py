@@ -15,7 +15,15 @@ import hpccd_core as hc
 cupy = pytest.importorskip("cupy")
 
 ROWS = {"vf": ((2,), "<u4"), "ee": ((4,), "<u4"), "vf_toc": ((), "<f8"), "ee_toc": ((), "<f8")}
-PLACES = {"points": (3,), "normals": (3,), "closest": (2, 3)}
+PLACES = {
+    "points": ((3,), "<f8"),
+    "normals": ((3,), "<f8"),
+    "closest": ((2, 3), "<f8"),
+    "vertices": ((4,), "<u4"),
+    "weights": ((4,), "<f8"),
+    "approach": ((), "<f8"),
+}
+OUTPUTS = ("points", "normals", "closest", "weights")
 N = 20
 
 
@@ -37,11 +45,11 @@ def settled(scene, t0, t1, **options):
 
 def test_what_they_say_of_themselves():
     scene, t0, t1 = crumpled()
-    found = hc.Detector(scene, backend="gpu", results="device", outputs=tuple(PLACES)).detect(t0, t1)
+    found = hc.Detector(scene, backend="gpu", results="device", outputs=OUTPUTS).detect(t0, t1)
     host = found.to_host()
     assert len(found) == len(host) > 0
     arrays = {name: (row, kind, len(getattr(host, name))) for name, (row, kind) in ROWS.items()}
-    arrays |= {name: (row, "<f8", len(host)) for name, row in PLACES.items()}
+    arrays |= {name: (row, kind, len(host)) for name, (row, kind) in PLACES.items()}
     for name, (row, kind, n) in arrays.items():
         array = getattr(found, name)
         interface = array.__cuda_array_interface__
@@ -78,7 +86,7 @@ def test_of_nothing(worlds):
     scene, _, _ = crumpled()
     flat = scenes.flat(N)
     given = flat if worlds is None else np.stack([flat] * worlds)
-    detector = hc.Detector(scene, backend="gpu", results="device", worlds=worlds, outputs=tuple(PLACES))
+    detector = hc.Detector(scene, backend="gpu", results="device", worlds=worlds, outputs=OUTPUTS)
     for _ in range(2):
         found = detector.detect(given, given)
         assert_on_gpu(detector)
@@ -87,8 +95,9 @@ def test_of_nothing(worlds):
             array = getattr(found, name)
             assert array.shape == (0, *row) and array.dtype == np.dtype(kind)
             assert cupy.asarray(array).shape == cupy.from_dlpack(array).shape == array.shape
-        for name, row in PLACES.items():
-            assert getattr(found, name).to_host().shape == (0, *row)
+        for name, (row, kind) in PLACES.items():
+            array = getattr(found, name).to_host()
+            assert array.shape == (0, *row) and array.dtype == np.dtype(kind)
         alone = hc.Detector(scene, backend="cpu").detect(flat, flat)
         for k in range(worlds or 1):
             np.testing.assert_array_equal(found.world(k).to_host().vf, alone.vf)

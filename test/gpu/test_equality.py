@@ -48,7 +48,7 @@ def test_ropes_alone_and_beside_others(accuracy):
     rng = np.random.default_rng(15)
     for parts in ([scenes.rope(rng, 200)], [scenes.rope(rng, 90), scenes.crumpled(rng, 12), scenes.rope(rng, 2)]):
         scene, t0, t1 = scenes.join(parts)
-        found = assert_same(scene, t0, t1, accuracy=accuracy, outputs=("points", "normals"))
+        found = assert_same(scene, t0, t1, accuracy=accuracy, outputs=("points", "normals", "weights"))
         assert len(found.ee) > 50 and (len(found.vf) > 0) == (len(parts) > 1)
 
 
@@ -111,7 +111,7 @@ def test_rules_between_meshes():
 
 def test_points_and_normals():
     scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(6), 16)])
-    assert_same(scene, t0, t1, outputs=("points", "normals"))
+    assert_same(scene, t0, t1, outputs=("points", "normals", "weights"))
 
 
 def test_report_first_and_any():

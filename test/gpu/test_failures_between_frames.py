@@ -34,11 +34,11 @@ def sheet():
 
 
 CASES = {
-    "places": (sheet, {"outputs": ("points", "closest")}),
+    "places": (sheet, {"outputs": ("points", "closest", "weights")}),
     "sorted": (lambda: device_results.needle_through_plates(2100), {}),
     "added": (many_bits, {}),
     "any": (sheet, {"report": "any"}),
-    "worlds": (lambda: garments(3, n=8), {"worlds": 3, "outputs": ("normals",)}),
+    "worlds": (lambda: garments(3, n=8), {"worlds": 3, "outputs": ("normals", "weights")}),
 }
 
 

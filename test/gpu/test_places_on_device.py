@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Points, normals and nearest points of results on the device: the CPU's bits, computed there but for few rows."""
+"""Points, normals, nearest points and weights on the device: the CPU's bits, computed there but for few rows."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ import hpccd_core as hc
 
 cupy = pytest.importorskip("cupy")
 
-PLACES = ("points", "normals", "closest")
+PLACES = ("points", "normals", "closest", "weights")
 
 
 def bits(array):
@@ -20,7 +20,8 @@ def bits(array):
 def assert_same_places(found, expected):
     found = found.to_host()
     assert found.hash == expected.hash and len(found) == len(expected) > 0
-    for name in (name for name in PLACES if hasattr(expected, name)):
+    assert found.outputs.keys() == expected.outputs.keys()
+    for name in expected.outputs:
         np.testing.assert_array_equal(bits(getattr(found, name)), bits(getattr(expected, name)), err_msg=name)
 
 
@@ -31,7 +32,7 @@ def crumpled(seed=0, n=40, dtype=np.float64):
 
 @pytest.mark.parametrize("dtype", (np.float32, np.float64))
 @pytest.mark.parametrize("report", ("all", "first"))
-@pytest.mark.parametrize("outputs", (("points",), ("normals",), ("points", "normals")))
+@pytest.mark.parametrize("outputs", (("points",), ("normals",), ("weights",), ("points", "normals", "weights")))
 def test_contacts(outputs, report, dtype):
     scene, t0, t1 = crumpled(dtype=dtype)
     options = {"outputs": outputs, "report": report}
@@ -41,7 +42,8 @@ def test_contacts(outputs, report, dtype):
         assert_same_places(detector.detect(*ends), expected)
         assert_on_gpu(detector)
         assert detector.stats["gpu_places_on_cpu"] <= len(expected) / 8
-    assert {name: len(rows) for name, rows in expected.outputs.items()} == dict.fromkeys(outputs, len(expected))
+    asked = (*outputs, *(("vertices", "approach") if "weights" in outputs else ()))
+    assert {name: len(rows) for name, rows in expected.outputs.items()} == dict.fromkeys(asked, len(expected))
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -61,7 +63,7 @@ def test_degenerate_features_and_coplanar_motion(seed):
 def test_of_every_size(scale):
     scene, t0, t1 = crumpled(3)
     t0, t1 = scale * t0, scale * t1
-    options = {"outputs": ("points", "normals")}
+    options = {"outputs": ("points", "normals", "weights")}
     expected = hc.Detector(scene, backend="cpu", **options).detect(t0, t1)
     assert_same_places(hc.Detector(scene, backend="gpu", results="device", **options).detect(t0, t1), expected)
 
@@ -79,7 +81,7 @@ def test_separation(dtype):
 @pytest.mark.parametrize("dtype", (np.float32, np.float64))
 def test_nearest_points_of_what_is_near(dtype):
     scene, t0, _ = crumpled(5, 30, dtype)
-    options = {"outputs": ("closest",)}
+    options = {"outputs": ("closest", "normals", "weights")}
     detector = hc.Detector(scene, backend="gpu", results="device", **options)
     for distance in (0.02, 0.4):
         expected = hc.Detector(scene, backend="cpu", **options).proximity(t0, distance)
@@ -117,7 +119,7 @@ def test_where_most_rows_need_integers_the_cpu_computes_all():
 
 def test_what_is_held_stays_and_memory_settles():
     scene, t0, t1 = needle_through_plates(300)
-    options = {"outputs": ("points", "normals")}
+    options = {"outputs": ("points", "normals", "weights")}
     expected = hc.Detector(scene, backend="cpu", **options).detect(t0, t1)
     detector = hc.Detector(scene, backend="gpu", results="device", **options)
     held = detector.detect(t0, t1)

@@ -94,7 +94,7 @@ def test_queries_of_a_snapshot_and_separations():
     for _ in range(2):
         assert_same(detector.proximity(cupy.asarray(t0), 0.3), cpu.proximity(t0, 0.3))
         assert_same(detector.intersections(cupy.asarray(t1)), cpu.intersections(t1))
-    for options in ({"minimum_separation": 0.1}, {"outputs": ("points", "normals", "closest")}):
+    for options in ({"minimum_separation": 0.1}, {"outputs": ("points", "normals", "closest", "weights")}):
         expected = hc.Detector(scene, backend="cpu", **options).detect(t0, t1)
         assert_same(hc.Detector(scene, backend="gpu", results="device", **options).detect(t0, t1), expected)
 

@@ -113,7 +113,8 @@ def test_any_queue(segments, pairs):
 def test_points_normals_and_nearest_points(separation):
     scene, t0, t1 = three_meshes(8)
     scene.set_separation("mesh0", "mesh0", 0.0)
-    contacts = assert_same(scene, t0, t1, minimum_separation=separation, outputs=("points", "normals", "closest"))
+    outputs = ("points", "normals", "closest", "weights")
+    contacts = assert_same(scene, t0, t1, minimum_separation=separation, outputs=outputs)
     assert len(contacts.closest) == len(contacts) > 0
 
 
@@ -143,8 +144,8 @@ def test_rods_at_rest():
 def test_device_arrays():
     cupy = pytest.importorskip("cupy")
     scene, t0, t1 = three_meshes(10)
-    expected = hc.Detector(scene, backend="cpu", minimum_separation=0.1, outputs=("points",)).detect(t0, t1)
-    detector = hc.Detector(scene, backend="gpu", minimum_separation=0.1, outputs=("points",))
+    expected = hc.Detector(scene, backend="cpu", minimum_separation=0.1, outputs=("points", "weights")).detect(t0, t1)
+    detector = hc.Detector(scene, backend="gpu", minimum_separation=0.1, outputs=("points", "weights"))
     for _ in range(2):
         assert_equal(detector.detect(cupy.asarray(t0), cupy.asarray(t1)), expected)
 

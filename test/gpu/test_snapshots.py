@@ -44,7 +44,8 @@ def assert_gaps_same(cpu, gpu, vertices):
     """Of these the CPU takes care, whatever the backend."""
     for found, expected in zip(gpu.distances(vertices), cpu.distances(vertices), strict=True):
         assert (found.distance, found.features) == (expected.distance, expected.features)
-        np.testing.assert_array_equal(found.points, expected.points)
+        for name in ("points", "vertices", "weights", "normal"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
 
 
 @pytest.mark.parametrize("accuracy", TIERS)
@@ -115,7 +116,7 @@ def test_rules_between_meshes():
 
 def test_nearest_points():
     scene, vertices, _ = scenes.join([scenes.lattice(np.random.default_rng(6), 14)])
-    near = assert_near_same(*detectors(scene, outputs=("closest", "points")), vertices, 1.0)
+    near = assert_near_same(*detectors(scene, outputs=("closest", "points", "normals", "weights")), vertices, 1.0)
     assert near.closest.shape == (len(near), 2, 3)
 
 

@@ -77,7 +77,7 @@ def test_other_queries(results):
 @pytest.mark.parametrize("results", ("host", "device"))
 def test_places(results):
     scene, t0, t1 = garments(3)
-    options = {"worlds": 3, "outputs": ("points", "normals", "closest")}
+    options = {"worlds": 3, "outputs": ("points", "normals", "closest", "weights")}
     expected = hc.Detector(scene, backend="cpu", **options).detect(t0, t1)
     found = hc.Detector(scene, backend="gpu", results=results, **options).detect(t0, t1)
     assert_same(found, expected)
