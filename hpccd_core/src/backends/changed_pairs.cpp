@@ -2,7 +2,6 @@
 #include "backends/changed_pairs.h"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 namespace hpccd {
@@ -21,24 +20,54 @@ void list_by_vertex(Adjacency& lists, std::size_t n_vertices, const std::vector<
 ChangedPairs::ChangedPairs(const Features& features) : features_(features) {
   list_by_vertex(edges_of_, features.n_vertices, features.edges);
   list_by_vertex(faces_of_, features.n_vertices, features.faces);
-  vertices_.is.resize(features.n_vertices), edges_.is.resize(features.edges.size());
-  faces_.is.resize(features.faces.size());
+  vertices_.resize(features.n_vertices), edges_.resize(features.edges.size()), faces_.resize(features.faces.size());
 }
 
 std::vector<std::vector<PairGroup>>& ChangedPairs::empty_lists(std::size_t n) {
   listed_by_feature_ = false;
-  candidates_.resize(n);
-  for (auto& of_worker : candidates_)
-    for (PairGroup& group : of_worker) group.first.clear(), group.second.clear();
-  return candidates_;
+  of_workers_.resize(n);
+  for (auto& groups : of_workers_)
+    for (PairGroup& group : groups) group.first.clear(), group.second.clear();
+  return of_workers_;
+}
+
+void ChangedPairs::join(ThreadPool& pool) {
+  struct Part {
+    PairGroup* from;
+    std::size_t to, at;
+  };
+  std::vector<Part> parts;
+  std::vector<std::size_t> sizes(candidates_.size());
+  for (auto& groups : of_workers_)
+    for (PairGroup& group : groups) {
+      std::size_t to = 0;
+      while (to < candidates_.size() && !candidates_[to].pairs.tested_like(group)) ++to;
+      if (to == candidates_.size())
+        candidates_.push_back({{group.kind, group.rule, {}, {}}, {}, {}, {}}), sizes.push_back(0);
+      parts.push_back({&group, to, sizes[to]});
+      sizes[to] += group.first.size();
+    }
+  for (std::size_t i = 0; i < sizes.size(); ++i)
+    candidates_[i].pairs.first.resize(sizes[i]), candidates_[i].pairs.second.resize(sizes[i]);
+  parallel_for_each(pool, parts.size(), [&](std::size_t i) {
+    const auto& [from, to, at] = parts[i];
+    for (const auto features : {&PairGroup::first, &PairGroup::second}) {
+      std::vector<std::uint32_t>&source = from->*features, &target = candidates_[to].pairs.*features;
+      if (source.size() == target.size())
+        source.swap(target);  // the only one
+      else
+        std::ranges::copy(source, target.data() + at);
+    }
+  });
 }
 
 void ChangedPairs::Marks::set(std::uint32_t i) {
-  if (!std::exchange(is[i], 1)) list.push_back(i);
+  if (!is(i)) list.push_back(i);
+  bits[i / 64] |= std::uint64_t{1} << i % 64;
 }
 
 void ChangedPairs::Marks::clear() {
-  for (const std::uint32_t i : list) is[i] = 0;
+  for (const std::uint32_t i : list) bits[i / 64] = 0;
   list.clear();
 }
 
@@ -51,63 +80,34 @@ void ChangedPairs::mark(std::span<const std::uint32_t> vertices) {
   }
 }
 
-// f(group, its number, the number of its first candidate): for the groups of this kind.
-template <class F>
-void ChangedPairs::for_each_group(Kind kind, F&& f) const {
-  std::size_t number = 0, begin = 0;
-  for (const auto& of_worker : candidates_)
-    for (const PairGroup& group : of_worker) {
-      if (group.kind == kind) f(group, number, begin), begin += group.first.size();
-      ++number;
-    }
-}
-
 void ChangedPairs::list_by_feature(ThreadPool& pool) {
-  const auto list = [&](Adjacency& lists, Kind kind, std::size_t n, std::vector<std::uint32_t> PairGroup::* features) {
+  const auto list = [](Adjacency& lists, std::size_t n, const std::vector<std::uint32_t>& features) {
     lists.assign(n, [&](auto&& take) {
-      for_each_group(kind, [&](const PairGroup& group, std::size_t, std::size_t begin) {
-        for (const std::uint32_t feature : group.*features) take(feature, static_cast<std::uint32_t>(begin++));
-      });
+      for (std::uint32_t i = 0; i < features.size(); ++i) take(features[i], i);
     });
   };
-  parallel_for_each(pool, 4, [&](std::size_t i) {
-    const Kind kind = i < 2 ? Kind::edge_edge : Kind::vertex_face;
-    OfFeatures& of = of_features_[i / 2];
+  parallel_for_each(pool, 2 * candidates_.size(), [&](std::size_t i) {
+    Candidates& c = candidates_[i / 2];
+    if (!c.numbered()) return;
     if (i % 2 == 0)
-      list(of.first, kind, marks_of_first(kind).is.size(), &PairGroup::first);
+      list(c.of_first, marks_of_first(c.pairs.kind).size, c.pairs.first);
     else
-      list(of.second, kind, marks_of_second(kind).is.size(), &PairGroup::second);
+      list(c.of_second, marks_of_second(c.pairs.kind).size, c.pairs.second);
   });
   listed_by_feature_ = true;
 }
 
-// False if there are more candidates than numbers.
-bool ChangedPairs::list_changed(ThreadPool& pool) {
-  std::size_t n_groups = 0, n = 0;
-  for (const auto& of_worker : candidates_)
-    for (const PairGroup& group : of_worker) ++n_groups, n += group.first.size();
-  if (n > std::numeric_limits<std::uint32_t>::max()) return false;
-  if (!listed_by_feature_) list_by_feature(pool);
-  changed_.resize(n_groups);
-  for (auto& of_group : changed_) of_group.clear();
-  for (const Kind kind : {Kind::edge_edge, Kind::vertex_face}) {
-    const Marks &of_first = marks_of_first(kind), &of_second = marks_of_second(kind);
-    const OfFeatures& of = of_features_[kind == Kind::edge_edge ? 0 : 1];
-    for_each_group(kind, [&](const PairGroup& group, std::size_t number, std::size_t begin) {
-      const auto of_group = [&](const Adjacency& lists, std::uint32_t feature) {
-        const std::span<const std::uint32_t> all = lists[feature];
-        return std::span(std::ranges::lower_bound(all, begin),
-                         std::ranges::lower_bound(all, begin + group.first.size()));
-      };
-      for (const std::uint32_t feature : of_first.list)
-        for (const std::uint32_t i : of_group(of.first, feature))
-          changed_[number].push_back(static_cast<std::uint32_t>(i - begin));
-      for (const std::uint32_t feature : of_second.list)
-        for (const std::uint32_t i : of_group(of.second, feature))
-          if (!of_first.is[group.first[i - begin]]) changed_[number].push_back(static_cast<std::uint32_t>(i - begin));
-    });
+void ChangedPairs::list_changed(Candidates& c) const {
+  c.changed.clear();
+  if (!c.numbered()) return;
+  const Marks& of_first = marks_of_first(c.pairs.kind);
+  for (const std::uint32_t feature : of_first.list) {
+    const std::span<const std::uint32_t> all = c.of_first[feature];
+    c.changed.insert(c.changed.end(), all.begin(), all.end());
   }
-  return true;
+  for (const std::uint32_t feature : marks_of_second(c.pairs.kind).list)
+    for (const std::uint32_t pair : c.of_second[feature])
+      if (!of_first.is(c.pairs.first[pair])) c.changed.push_back(pair);
 }
 
 }  // namespace hpccd

@@ -324,6 +324,7 @@ bool CpuBackend::shorten_to_rest(Positions t0, Shortening& motion) {
   search_whole_ways(t0, motion.end());
   std::span<const std::uint32_t> vertices = motion.shorten(touching());
   const bool shortened = !vertices.empty();
+  if (shortened) whole_->pairs.join(shared_.pool);
   for (; !vertices.empty(); vertices = motion.shorten(touching())) {
     whole_->tree.shorten(t0, motion.end(), vertices);
     shared_.profiler.mark("bounds");

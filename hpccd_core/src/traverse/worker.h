@@ -27,6 +27,7 @@ struct PairGroup {
   Kind kind;
   Rule rule;
   std::vector<std::uint32_t> first, second;
+  bool tested_like(const PairGroup& o) const { return kind == o.kind && rule.number() == o.rule.number(); }
 };
 
 // If contacts bound the search, early ones matter most: the first batches are small.
