@@ -11,6 +11,7 @@ for each element; a detector with `worlds` takes one call for all.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -24,6 +25,7 @@ from .detector import Detector
 try:
     import jax
     import jax.numpy as jnp
+    from jax.experimental.buffer_callback import buffer_callback
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(
         f"hpccd_core.jax: cannot import JAX ({error}); pip install jax", name=error.name
@@ -204,11 +206,19 @@ def _evaluate(detector: _AnyDetector, ask: Callable[..., Linearization], size: i
         gradients = [_padded(gradient, size, 0.0, real) for gradient in found.gradients]
         return Rows(values, vertices, np.int32(len(found.values))), gradients
 
+    def in_place(_: Any, out: Any, *ends: Any) -> None:
+        for buffer, array in zip(jax.tree.leaves(out), jax.tree.leaves(on_host(*ends)), strict=True):
+            np.asarray(buffer)[...] = array
+
+    likes = rows_like, gradients_like
+    # On CPUs pure_callback copies the positions in a thread of the pool that may have no other than this callback's:
+    # on one core it waited for ever.
+    on_cpu = buffer_callback(in_place, likes, vmap_method="sequential")
+    elsewhere = functools.partial(jax.pure_callback, on_host, likes, vmap_method="sequential")
+
     def query(*ends: jax.Array) -> tuple[Rows, list[jax.Array]]:
-        result: tuple[Rows, list[jax.Array]] = jax.pure_callback(
-            on_host, (rows_like, gradients_like), *ends, vmap_method="sequential"
-        )
-        return result
+        found: tuple[Rows, list[jax.Array]] = jax.lax.platform_dependent(*ends, cpu=on_cpu, default=elsewhere)
+        return found
 
     @jax.custom_vjp
     def rows_of(*ends: jax.Array) -> Rows:
