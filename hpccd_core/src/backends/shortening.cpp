@@ -38,11 +38,11 @@ Shortening::Shortening(Positions t0, Positions t1, std::span<const std::int64_t>
   for (std::size_t v = 0; v < t0.n; ++v)
     for (std::size_t i = 3 * v; i < 3 * v + 3; ++i) moves_[v] |= coordinate(t0, i) != coordinate(t1, i);
   if (!groups.empty()) {
-    slots_.resize(t0.n);
+    slots_.resize(t0.n), grouped_.resize(t0.n);
     std::iota(slots_.begin(), slots_.end(), 0u);
     std::unordered_map<std::int64_t, std::uint32_t> first;
     for (std::uint32_t v = 0; v < t0.n; ++v)
-      if (groups[v] >= 0) slots_[v] = first.try_emplace(groups[v], v).first->second;
+      if (groups[v] >= 0) grouped_[v] = 1, slots_[v] = first.try_emplace(groups[v], v).first->second;
   }
   next_ = factors_;
 }
@@ -66,10 +66,13 @@ void Shortening::take(const Touching& pair, double part) {
   bool all_at_floor = true;
   for (const std::uint32_t v : pair.vertices) all_at_floor = all_at_floor && (!moves_[v] || factor(v) <= floor_);
   for (const std::uint32_t v : pair.vertices) {
-    if (pair.toc <= 0) stuck_[v] = true;
+    double& next = next_[slots_.empty() ? v : slots_[v]];
+    if (pair.toc <= 0) {
+      stuck_[v] = true;
+      if (!grouped_.empty() && grouped_[v]) next = 0;  // also if this one does not move
+    }
     if (!moves_[v]) continue;
     const double now = factor(v), shorter = part * pair.toc * now;
-    double& next = next_[slots_.empty() ? v : slots_[v]];
     next = std::min(next, all_at_floor || pair.toc <= 0 ? shorter : std::max(shorter, std::min(now, floor_)));
   }
 }
@@ -82,16 +85,15 @@ std::span<const std::uint32_t> Shortening::shorten(std::span<const Touching> pai
     floor_ = kept * first;
   }
   const double part = ++round_ > most_rounds ? 0 : kept;
+  // Times are rounded down to 0 too. A pair that touches when nothing changes any more touches at the start.
+  std::ranges::fill(stuck_, 0);
   for (const Touching& pair : pairs) take(pair, part);
   changed_.clear();
   for (std::uint32_t v = 0; v < t0_.n; ++v) {
     const std::uint32_t slot = slots_.empty() ? v : slots_[v];
     if (moves_[v] && next_[slot] < factors_[slot]) changed_.push_back(v);
   }
-  for (const std::uint32_t v : changed_) {
-    const std::uint32_t slot = slots_.empty() ? v : slots_[v];
-    factors_[slot] = next_[slot];
-  }
+  factors_ = next_;
   for (const std::uint32_t v : changed_) move(v);
   return changed_;
 }

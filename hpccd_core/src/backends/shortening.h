@@ -39,6 +39,7 @@ class Shortening {
   std::vector<std::uint32_t> slots_;  // by vertex, of its factor; empty: its own number
   std::vector<double> factors_, next_;
   std::vector<char> moves_, stuck_;
+  std::vector<char> grouped_;  // empty: none is
   std::vector<std::uint32_t> changed_;
   double floor_ = -1;
   int round_ = 0;
