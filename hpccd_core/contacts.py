@@ -23,9 +23,9 @@ def toc_gradients(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """What `Contacts.toc_gradients` returns, of arrays with one row for each contact."""
     arms = weights[:, :, None] * normals[:, None, :]
-    per_approach = np.full(len(toc), np.nan)
-    np.divide(-1, approach, out=per_approach, where=(toc > 0) & (approach != 0))
-    return ((1 - toc) * per_approach)[:, None, None] * arms, (toc * per_approach)[:, None, None] * arms
+    speed = np.where((toc > 0) & (approach != 0), -approach, np.nan)[:, None, None]
+    with np.errstate(over="ignore"):  # of motions near the smallest double
+        return (1 - toc)[:, None, None] * arms / speed, toc[:, None, None] * arms / speed
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -256,6 +256,49 @@ def test_slivers(height):
             assert np.abs(found.weights[0] @ np.array([at, *face])).max() < 1e-14
 
 
+@pytest.mark.parametrize("short", 10.0 ** np.arange(-17, 0, 2))
+def test_triangles_with_one_short_side(short):
+    """Within roundings of its size, whichever of its corners are near each other, and wherever it is."""
+    rng = np.random.default_rng(0)
+    touching = 0
+    for _ in range(200):
+        turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+        face = (np.array([[0, 0, 0], [3, 0, 0], [0, short, 0]]) @ turn + rng.normal(size=3))[rng.permutation(3)]
+        at = rng.dirichlet(np.ones(3) * 0.3) @ face
+        start, end = np.array([at + turn[2], *face]), np.array([at - turn[2], *face])
+        found = pair(start, end)
+        touching += len(found.vf)
+        gap, size, _ = gaps(found, start, end)
+        assert (np.abs(gap).max(1, initial=0) <= size).all()
+    assert touching > (0 if short < 1e-15 else 10)
+
+
+@pytest.mark.parametrize("separation", [0.0, 0.25])
+def test_what_comes_into_contact_approaches(separation):
+    """Features that shrink to a few roundings of themselves, for whose normal rounding decides."""
+    rng = np.random.default_rng(1)
+    for seed in range(400):
+        vertex_face = seed % 2 == 0
+        start, end = rng.integers(-6, 7, (2, 4, 3)).astype(float)
+        kept, gone = ((1, 2), (0, 1))[rng.integers(2)] if vertex_face else ((0, 1), (2, 3))[rng.integers(2)]
+        end[gone] = end[kept]
+        if rng.integers(2):
+            end[3 - kept] = end[kept]
+        end[gone] = np.nextafter(end[gone], rng.choice([-9.0, 9.0], 3))
+        found = pair(start, end, minimum_separation=separation, **({} if vertex_face else EDGES))
+        assert (found.approach[times(found) > 0] <= 0).all()
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("depth", [0, 1])
+def test_of_denormal_motions(depth):
+    """The derivative is beyond the largest double."""
+    found = pair(np.array([[0.25, 0.5, 1], *FACE]) * 1e-320, np.array([[0.25, 0.5, -depth], *FACE]) * 1e-320)
+    assert found.vf_toc[0] > 0 > found.approach[0]
+    for gradient, part in zip(found.toc_gradients(), (depth, 1), strict=True):
+        assert np.isinf(gradient[0, 0, 2]) == (part > 0) and not gradient[:, :, :2].any()
+
+
 def test_of_a_step_in_parts():
     """The approach is per step, of which a part is a fraction."""
     scene = hc.Scene()

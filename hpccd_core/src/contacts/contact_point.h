@@ -38,8 +38,11 @@ class ContactPoint {
   HPCCD_HOST_DEVICE Places places() const {
     if constexpr (kind == Kind::edge_edge) return crossing();
     if (!regular_) return face_place(p_, a_, b_);
-    const double per_nn = 1 / nn_, alpha = clamped(per_nn * dot(cross(p_, b_), n_));
-    return {alpha, lesser(1 - alpha, greater(0.0, per_nn * dot(cross(a_, p_), n_)))};
+    // On a short side the place may be any, within roundings of p: only what the other leaves is its.
+    const double per_nn = 1 / nn_;
+    const double alpha = clamped(per_nn * dot(cross(p_, b_), n_)), beta = clamped(per_nn * dot(cross(a_, p_), n_));
+    if (largest(a_) < largest(b_)) return {lesser(1 - beta, alpha), beta};
+    return {alpha, lesser(1 - alpha, beta)};
   }
 
   // The vertex; or the point of the shorter edge. The numbering of vertices and the order of edges affect neither this

@@ -9,13 +9,16 @@
 namespace hpccd {
 
 // The derivative of the gap along the normal, at the time of these places. Where the features graze each other it would
-// be rounding errors of the motion: these count as 0, so that nobody divides by them.
+// be rounding errors of the motion: these count as 0, so that nobody divides by them. So does a positive one of a
+// contact within the step: features that touch there for the first time have approached each other.
 template <Kind kind>
-HPCCD_HD double approach_of(const Vec3<double> t0[4], const Vec3<double> t1[4], Places at, const Vec3<double>& normal) {
+HPCCD_HD double approach_of(const Vec3<double> t0[4], const Vec3<double> t1[4], double toc, Places at,
+                            const Vec3<double>& normal) {
   const Motion<double> m = motion_of<kind>(t0, t1);
   const Vec3<double> dp = m.p1 - m.p0, da = m.a1 - m.a0, db = m.b1 - m.b0;
   const double speed = dot(normal, dp - at.alpha * da - at.beta * db);
-  return fabs(speed) > 0x1p-46 * (largest(dp) + largest(da) + largest(db)) ? speed : 0;
+  const double rounding = 0x1p-46 * (largest(dp) + largest(da) + largest(db));
+  return speed < -rounding || (toc <= 0 && speed > rounding) ? speed : 0;
 }
 
 template <Kind kind>
@@ -59,7 +62,7 @@ HPCCD_HD PairPlaces pair_places(const Vec3<double> t0[4], const Vec3<double> t1[
     if (normal_open) places.normal = contact.normal(arbiter);
   }
   if (outputs.weights) write_weights<kind>(at, places.weights);
-  if (approach) places.approach = approach_of<kind>(t0, t1, at, places.normal);
+  if (approach) places.approach = approach_of<kind>(t0, t1, toc, at, places.normal);
   return places;
 }
 
