@@ -167,6 +167,29 @@ def test_groups_share_a_factor():
     assert (together.factors[:40] == 1).all()
 
 
+def test_a_group_stays_with_a_resting_vertex_in_contact():
+    scene = hc.Scene()
+    scene.add_mesh("points", np.empty((0, 3), int), n_vertices=3)
+    scene.add_mesh("face", [[0, 1, 2]])
+    start = np.array([[0.25, 0.25, 0], [5, 5, 5], [6, 6, 6], [0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    end = start + [[0, 0, 0], [0, 0, 1], [0, 0, 1], [0, 0, 0], [0, 0, 0], [0, 0, 0]]
+    motion = hc.Detector(scene, backend="cpu").collision_free_motion(start, end, [4, 4, -1, -1, 9, 9])
+    assert motion.factors.tolist() == [0, 0, 1, 0, 0, 0] and motion.stuck.tolist() == [0, 3, 4, 5]
+    assert np.array_equal(motion.vertices[:2], start[:2])
+
+
+@pytest.mark.parametrize("gap", 10.0 ** -np.arange(1, 300, 13))
+def test_only_vertices_in_contact_at_the_start_are_stuck(gap):
+    """However soon others would be: their times are rounded to 0 in the end."""
+    scene = hc.Scene()
+    scene.add_mesh("point", np.empty((0, 3), int), n_vertices=1)
+    scene.add_mesh("face", [[0, 1, 2]])
+    start = np.array([[0.25, 0.25, gap], [0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    end = start - [[0, 0, 1], [0, 0, 0], [0, 0, 0], [0, 0, 0]]
+    motion = hc.Detector(scene, backend="cpu").collision_free_motion(start, end)
+    assert not len(motion.stuck) and (motion.factors[1:] == 1).all() and motion.vertices[0, 2] > 0
+
+
 def test_worlds_are_computed_one_by_one():
     rng = np.random.default_rng(3)
     meshes = random_scenes.many_meshes(rng)

@@ -70,7 +70,7 @@ def broken_promise(
     moves, whole, none = (start != end).any(axis=1), factors == 1, factors == 0
     is_stuck = np.isin(np.arange(len(start)), stuck)
     exact = start + factors[:, None] * (end.astype(float) - start)
-    shared = [factors[(groups == group) & (moves | ~is_stuck)] for group in np.unique(groups[groups >= 0])]
+    shared = [factors[groups == group] for group in np.unique(groups[groups >= 0])]
     mistakes = {
         "instruction sets differ": any(other != motion for other in others),
         "type": motion.vertices.dtype != start.dtype,
