@@ -25,6 +25,9 @@ REALS = frozenset({np.dtype(np.float32), np.dtype(np.float64)})  # in this machi
 LARGEST_COORDINATE = 1e150  # largest_coordinate in src/base/coordinate_limits.h
 DEEPEST = 8  # levels of nested lists: arguments have at most three dimensions, and a list may contain itself
 
+#: Words that may be meant for a choice, beside misspellings of it.
+ALIASES = {"vertices": "weights", "approach": "weights", "barycentrics": "weights", "toc_gradients": "weights"}
+
 Word = TypeVar("Word", bound=str)
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -79,6 +82,7 @@ def reject_unnamed(query: str, remedy: str) -> NoReturn:
 def did_you_mean(word: str, choices: Iterable[str]) -> str:
     """The end of an error message: the choice that is spelled most like the word, if one is."""
     by_lower = {choice.lower(): choice for choice in choices}
+    by_lower |= {alias: choice for alias, choice in ALIASES.items() if choice in by_lower}
     near = difflib.get_close_matches(word.lower().replace("-", "_"), by_lower, n=1)
     return f"; did you mean {by_lower[near[0]]}?" if near else ""
 
@@ -335,15 +339,26 @@ def _is_list_of_meshes(value: object) -> TypeGuard[Sequence[object]]:
     return all(isinstance(mesh, np.ndarray) and mesh.ndim == 2 for mesh in value)
 
 
-def group_numbers(value: object, n_vertices: int) -> NDArray[np.int64]:
+def group_numbers(value: object, layout: MeshLayout) -> NDArray[np.int64]:
     """(V,) int64, each at least -1."""
     array = _array("groups", value)
     if array.dtype.kind not in "iu":
-        raise TypeError(f"groups: expected integers, got {array.dtype}; -1 is for a vertex on its own")
+        converted = {"b": "write numpy.where(groups, 0, -1)", "f": "convert with groups.astype(int)"}
+        remedy = converted.get(array.dtype.kind if array.ndim else "", "give a number for each vertex, in their order")
+        raise TypeError(f"groups: expected integers, got {_kind(value, array)}; {remedy}; -1: a vertex on its own")
+    n_vertices = int(sum(layout.vertex_counts))
     if array.shape != (n_vertices,):
-        raise ValueError(f"groups: expected shape ({n_vertices},), a number for each vertex, got {array.shape}")
-    if array.size and array.min() < -1:
-        raise ValueError(f"groups: numbers from 0, or -1 for a vertex on its own, got {array.min()}")
+        remedy = ""
+        if array.shape == (len(layout.mesh_names),):
+            remedy = "; from one of each mesh: numpy.repeat(groups, n), with the numbers n of their vertices"
+        elif array.ndim == 2 and array.shape[1] == n_vertices:
+            remedy = "; all worlds have the same groups: groups[0]"
+        elif array.size == n_vertices:
+            remedy = "; reshape it: groups.reshape(-1)"
+        raise ValueError(f"groups: expected shape ({n_vertices},), a number for each vertex, got {array.shape}{remedy}")
+    if array.size and not -1 <= array.min() <= array.max() < 2**63:
+        wrong = array.min() if array.min() < -1 else array.max()
+        raise ValueError(f"groups: numbers from 0 to 2**63 - 1, or -1 for a vertex on its own, got {wrong}")
     return np.require(array, np.int64, ["C", "A"])
 
 
@@ -472,8 +487,9 @@ def _array(name: str, value: object) -> NDArray[Any]:
 
 
 def _no_array(name: str, value: object, error: Exception) -> TypeError:
-    kind = type(value).__name__
-    return TypeError(f"{name}: {kind} cannot be converted to an array ({error}); give an array of numbers")
+    kind, library = type(value).__name__, type(value).__module__.partition(".")[0]
+    see = f"; for derivatives see hpccd_core.{library}" if library in ("torch", "jax") else ""
+    return TypeError(f"{name}: {kind} cannot be converted to an array ({error}); give an array of numbers{see}")
 
 
 def reject_masked(name: str, value: object) -> None:

@@ -189,7 +189,8 @@ class Contacts(WithSides, PairsOfWorlds):
         ([0.0, 0.0, 0.25], [0.0, 0.0, 0.25])
         """
         toc = np.concatenate([self.vf_toc, self.ee_toc])
-        return toc_gradients(toc, self.weights, self.normals, self.approach)
+        weights, normals = output(self.outputs, "weights", "normals"), self.normals
+        return toc_gradients(toc, weights, normals, self.approach)
 
     @property
     def first_tocs(self) -> NDArray[np.float64]:

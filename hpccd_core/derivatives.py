@@ -41,6 +41,13 @@ def check(detector: object, outputs: tuple[Output, ...] = NEEDED) -> None:
         raise ValueError(f"detector: gradients need its normals and weights; create it with outputs={asked!r}")
 
 
+def check_earliest(detector: Any) -> None:
+    """Raises TypeError or ValueError unless the detector computes the earliest contact with its gradient."""
+    check(detector)
+    if detector.report == "any":
+        raise ValueError("detector: with report='any' no contact is surely the earliest; use report='first'")
+
+
 def times(detector: Any, start: object, end: object) -> tuple[Contacts, Linearization]:
     """The contacts of a motion, and their times of impact in the order of their rows."""
     found: Contacts = detector.detect(start, end)

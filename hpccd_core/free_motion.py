@@ -24,7 +24,8 @@ class CollisionFreeMotion(ComparedByRows):
         Positions at the end, in the common dtype of both ends. The straight motion to exactly these numbers has no
         contact, except between vertices in `stuck`. A factor of 1 gives the given end itself.
     factors : ndarray, shape (V,) or (W, V), float64
-        How much of its own motion each vertex keeps, in [0, 1].
+        How much of its own motion each vertex keeps, in [0, 1]. Take the positions from `vertices`: start + factors
+        * displacement rounds differently, and has not been tested.
     stuck : ndarray, shape (K,), uint32
         Vertices of pairs in contact at t = 0; their factor is 0. With worlds: indices into ``factors.ravel()``.
     """

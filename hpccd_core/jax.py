@@ -12,7 +12,7 @@ for each element; a detector with `worlds` takes one call for all.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -102,20 +102,21 @@ def first_time_of_impact(detector: _AnyDetector, vertices_t0: jax.Array, vertice
     Parameters
     ----------
     detector : Detector
-        With outputs=("normals", "weights").
+        With outputs=("normals", "weights"), and not with report="any".
     vertices_t0, vertices_t1 : jax.Array, shape (V, 3) or (W, V, 3)
 
     Returns
     -------
     jax.Array, shape () or (W,)
-        +inf without contacts. Of several contacts at this time, the first in order has the gradient.
+        +inf, without a gradient, if there are no contacts. Of several contacts at this time, the first in order has
+        the gradient.
 
     Raises
     ------
     TypeError, ValueError
         As :func:`times_of_impact`.
     """
-    derivatives.check(detector)
+    derivatives.check_earliest(detector)
 
     def ask(start: object, end: object) -> Linearization:
         return derivatives.first_times(detector, start, end)
@@ -147,6 +148,7 @@ def proximity_distances(detector: _AnyDetector, vertices: jax.Array, distance: f
         As :func:`times_of_impact`.
     """
     derivatives.check(detector)
+    _reject_traced("distance", distance)
     distance = arguments.length("distance", distance)
 
     def ask(positions: object) -> Linearization:
@@ -183,10 +185,19 @@ def smallest_distances(detector: _AnyDetector, vertices: jax.Array) -> jax.Array
 
 
 def _size(size: int) -> int:
+    _reject_traced("size", size)
     return arguments.whole_number("size", size, 0, 2**31 - 1)
 
 
+def _reject_traced(name: str, value: object) -> None:
+    if isinstance(value, jax.core.Tracer):
+        raise TypeError(f"{name}: expected a number, got a traced value; make it a static argument of the function")
+
+
 def _evaluate(detector: _AnyDetector, ask: Callable[..., Linearization], size: int, **positions: jax.Array) -> Rows:
+    for name, value in positions.items():
+        if isinstance(value, Mapping):
+            raise TypeError(f"{name}: expected an array, got dict; concatenate the meshes in the order added")
     arrays = {name: jnp.asarray(value) for name, value in positions.items()}
     for name, array in arrays.items():  # while JAX traces: an error in the callback would be JAX's own
         one = np.zeros((), array.dtype)

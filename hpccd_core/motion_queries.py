@@ -113,9 +113,10 @@ class MotionQueries(Generic[MotionResult, StepResult]):
         Parameters
         ----------
         vertices_t0, vertices_t1 : Positions, shape (V, 3)
+            Both are positions: for displacements give vertices_t0 + displacements.
         groups : array_like, shape (V,), integer, optional
             Vertices with the same number share one factor; -1 is for a vertex on its own. For meshes that only
-            translate: a group that rotates would change its shape.
+            translate: a group that rotates would change its shape. Worlds have the same groups.
         stream : Stream, optional
 
         Returns
@@ -125,9 +126,8 @@ class MotionQueries(Generic[MotionResult, StepResult]):
 
         Notes
         -----
-        No factor is below 0.9 times `collision_free_step`, unless rounding leaves no such position. The result is
-        tested from the start, on the rounded numbers that are returned, at the detector's accuracy. Vertices that do
-        not move have the factor 1.
+        No factor is below 0.9 times `collision_free_step`, unless rounding leaves no such position. Vertices that do
+        not move have the factor 1, or 0 if `stuck`. The returned numbers are tested at the detector's accuracy.
 
         Examples
         --------
@@ -145,7 +145,7 @@ class MotionQueries(Generic[MotionResult, StepResult]):
         """
         if unnamed:
             arguments.reject_unnamed("collision_free_motion", "two arrays of positions and the groups")
-        numbers = np.empty(0, np.int64) if groups is None else arguments.group_numbers(groups, self.n_vertices)
+        numbers = np.empty(0, np.int64) if groups is None else arguments.group_numbers(groups, self._layout)
         vertices, factors, stuck = self._of_motion("collision_free_motion", vertices_t0, vertices_t1, stream, numbers)
         return CollisionFreeMotion(vertices.reshape(self._shape), factors.reshape(self._shape[:-1]), stuck)
 

@@ -50,12 +50,12 @@ class OutputNotComputed(ValueError, AttributeError):
     """
 
 
-def output(outputs: dict[str, Array], name: str) -> Array:
-    """The output of this name. Raises OutputNotComputed where it was not asked for."""
+def output(outputs: dict[str, Array], name: str, *others: str) -> Array:
+    """The output of this name. Raises OutputNotComputed where it was not asked for; names of others needed with it."""
     try:
         return outputs[name]
     except KeyError:
-        asked = tuple(dict.fromkeys(OUTPUT_ARRAYS[array].asked for array in (*outputs, name)))
+        asked = tuple(dict.fromkeys(OUTPUT_ARRAYS[array].asked for array in (*outputs, name, *others)))
         raise OutputNotComputed(f"{name}: not computed; make the detector with outputs={asked!r}") from None
 
 

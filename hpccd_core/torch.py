@@ -10,7 +10,7 @@ graze each other, at a distance of 0, and for +inf. There are no second derivati
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NoReturn
 
 from . import derivatives
@@ -89,7 +89,10 @@ class _Pullback(torch.autograd.Function):
 def _evaluate(ask: Callable[..., Any], **positions: torch.Tensor) -> tuple[torch.Tensor, Any]:
     for name, tensor in positions.items():
         if not isinstance(tensor, torch.Tensor):
-            raise TypeError(f"{name}: expected torch.Tensor, got {type(tensor).__name__}; use torch.as_tensor({name})")
+            remedy = f"use torch.as_tensor({name})"
+            if isinstance(tensor, Mapping):
+                remedy = "use torch.cat of the meshes in the order added"
+            raise TypeError(f"{name}: expected torch.Tensor, got {type(tensor).__name__}; {remedy}")
         if tensor.dtype not in (torch.float32, torch.float64):
             raise TypeError(f"{name}: expected float32 or float64, got {tensor.dtype}; convert with {name}.double()")
     question = _Question(ask)
@@ -129,13 +132,14 @@ def first_time_of_impact(detector: _AnyDetector, vertices_t0: torch.Tensor, vert
     Parameters
     ----------
     detector : Detector
-        With outputs=("normals", "weights").
+        With outputs=("normals", "weights"), and not with report="any".
     vertices_t0, vertices_t1 : torch.Tensor, shape (V, 3) or (W, V, 3)
 
     Returns
     -------
     torch.Tensor, shape () or (W,), float64
-        +inf without contacts. Of several contacts at this time, the first in order has the gradient.
+        +inf, without a gradient, if there are no contacts. Of several contacts at this time, the first in order has
+        the gradient.
 
     Raises
     ------
@@ -159,7 +163,7 @@ def first_time_of_impact(detector: _AnyDetector, vertices_t0: torch.Tensor, vert
     >>> time.item(), triangle.grad[0].tolist()  # half a unit later for each unit that it begins higher
     (0.5, [0.0, 0.0, 0.5])
     """
-    derivatives.check(detector)
+    derivatives.check_earliest(detector)
 
     def ask(start: object, end: object) -> tuple[None, derivatives.Linearization]:
         return None, derivatives.first_times(detector, start, end)

@@ -225,9 +225,16 @@ def test_beside_other_queries():
     "groups, error, text",
     [
         ([0, 1], ValueError, r"groups: expected shape \(72,\), a number for each vertex, got \(2,\)"),
-        (np.zeros(72), TypeError, "groups: expected integers, got float64; -1 is for a vertex on its own"),
-        (np.full(72, -2), ValueError, "groups: numbers from 0, or -1 for a vertex on its own, got -2"),
-        ("arm", TypeError, "groups: expected integers"),
+        ([0, 1], ValueError, r"; from one of each mesh: numpy.repeat\(groups, n\), with the numbers n of th"),
+        (np.zeros(71, int), ValueError, r"groups: .*, got \(71,\)$"),
+        (np.zeros((3, 72), int), ValueError, r"got \(3, 72\); all worlds have the same groups: groups\[0\]$"),
+        (np.zeros((72, 1), int), ValueError, r"got \(72, 1\); reshape it: groups.reshape\(-1\)$"),
+        (np.zeros(72), TypeError, r"got dtype float64; convert with groups.astype\(int\); -1: a vertex on its own$"),
+        (np.zeros(72, bool), TypeError, r"got dtype bool; write numpy.where\(groups, 0, -1\); -1: a vertex"),
+        (np.full(72, -2), ValueError, r"groups: numbers from 0 to 2\*\*63 - 1, or -1 for a vertex .*, got -2$"),
+        (np.full(72, 2**64 - 1, np.uint64), ValueError, f"groups: numbers from 0 to .*, got {2**64 - 1}$"),
+        ("arm", TypeError, "groups: expected integers, got str; give a number for each vertex, in their order"),
+        ({"arm": 0}, TypeError, "groups: expected integers, got dict; give a number for each vertex"),
     ],
 )
 def test_wrong_groups(groups, error, text):

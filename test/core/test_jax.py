@@ -186,6 +186,17 @@ def test_rejected_detectors_sizes_and_coordinates():
         hcj.first_time_of_impact(hc.Detector(hc.Scene()), start, end)
     with pytest.raises(ValueError, match="^size: "):
         hcj.times_of_impact(detector, start, end, size=-1)
+    with pytest.raises(TypeError, match="^size: expected a number, got a traced value; make it a static argument"):
+        jax.jit(lambda n: hcj.times_of_impact(detector, start, end, size=n))(2)
+    with pytest.raises(TypeError, match="^distance: expected a number, got a traced value"):
+        jax.grad(lambda d: hcj.proximity_distances(detector, start, d, size=2).values[0])(1.0)
+    with pytest.raises(TypeError, match="^vertices: expected an array, got dict; concatenate the meshes"):
+        hcj.smallest_distances(detector, {"falling": start})
+    with pytest.raises(TypeError, match="; for derivatives see hpccd_core.jax"):
+        jax.jit(detector.distances)(start)
+    any_contact = hc.Detector(hc.Scene(), outputs=("normals", "weights"), report="any")
+    with pytest.raises(ValueError, match="^detector: .*no contact is surely the earliest; use report='first'$"):
+        hcj.first_time_of_impact(any_contact, start, end)
     end[0, 0] = np.nan
     with pytest.raises(jax.errors.JaxRuntimeError, match=r"vertices_t1\[0, 0\] is NaN"):
         jax.block_until_ready(hcj.first_time_of_impact(detector, start, end))

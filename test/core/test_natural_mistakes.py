@@ -103,6 +103,11 @@ MISTAKES = {
     "unknown option": (detector(colour=1), r"no option 'colour'; help\(hpccd_core.Detector\) lists them$"),
     "misspelled choice": (detector(accuracy="Exakt"), "'Exakt' is not known.*did you mean exact[?]"),
     "output in singular": (detector(outputs="normal"), "outputs: 'normal' is not known.*did you mean normals[?]"),
+    "an array that is no output": (detector(outputs="vertices"), "'vertices' is not .*did you mean weights[?]"),
+    "gradients without their outputs": (
+        lambda: detect(BOTH, BOTH)().toc_gradients(),
+        r"^weights: not computed; make the detector with outputs=\('weights', 'normals'\)$",
+    ),
     "hyphen for underscore": (detector(features="vertex-face"), "did you mean vertex_face[?]"),
     "misspelled mesh": (lambda: scene().ignore_pair("cloth", "Ball"), "no mesh is named 'Ball'.*did you mean ball[?]"),
     "faces for a scene": (

@@ -208,6 +208,7 @@ def test_transforms():
     (lambda x: x.half(), "expected float32 or float64, got torch.float16; convert with vertices_t1.double()"),
     (lambda x: x.bfloat16(), "expected float32 or float64, got torch.bfloat16; convert with vertices_t1.double()"),
     (lambda x: x.int(), "expected float32 or float64, got torch.int32; convert with vertices_t1.double()"),
+    (lambda x: {"faces": x}, "expected torch.Tensor, got dict; use torch.cat of the meshes in the order added"),
     (lambda x: x.numpy(), "expected torch.Tensor, got ndarray; use torch.as_tensor(vertices_t1)"),
     (lambda x: x.T, "expected shape (6, 3), "),
     (lambda x: x[:5], "expected shape (6, 3), "),
@@ -228,11 +229,26 @@ def test_rejected_detectors():
     closest = hc.Detector(scene, outputs=("closest",))
     with pytest.raises(ValueError, match=r"create it with outputs=\('closest', 'normals', 'weights'\)$"):
         hct.proximity_distances(closest, x, 1.0)
+    any_contact = hc.Detector(scene, outputs=OUTPUTS, report="any")
+    with pytest.raises(ValueError, match="^detector: .*no contact is surely the earliest; use report='first'$"):
+        hct.first_time_of_impact(any_contact, x, x)
+    with pytest.raises(TypeError, match="^vertices: .*; for derivatives see hpccd_core.torch$"):
+        closest.distances(x.requires_grad_())
+    x = x.detach()
     hct.smallest_distances(closest, x)  # gaps always have their weights
     if "gpu" in hc.backends():
         on_device = hc.Detector(scene, outputs=OUTPUTS, results="device")
         with pytest.raises(ValueError, match="^detector: gradients are computed on the host; .* results='host'$"):
             hct.times_of_impact(on_device, x, x)
+
+
+def test_in_a_compiled_function():
+    detector, start, end = falling()
+    time = torch.compiler.disable(hct.first_time_of_impact)
+    start, x = tensors(start, end)
+    loss = torch.compile(lambda x: 2 * time(detector, start, x), backend="eager")
+    (gradient,) = torch.autograd.grad(loss(x), x)
+    assert gradient[0].tolist() == [0, 0, 0.5]
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU that PyTorch can use")
