@@ -342,6 +342,8 @@ def _is_list_of_meshes(value: object) -> TypeGuard[Sequence[object]]:
 def group_numbers(value: object, layout: MeshLayout) -> NDArray[np.int64]:
     """(V,) int64, each at least -1."""
     array = _array("groups", value)
+    if array.shape == (0,):
+        array = array.astype(np.int64)
     if array.dtype.kind not in "iu":
         converted = {"b": "write numpy.where(groups, 0, -1)", "f": "convert with groups.astype(int)"}
         remedy = converted.get(array.dtype.kind if array.ndim else "", "give a number for each vertex, in their order")

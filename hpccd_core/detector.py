@@ -443,6 +443,8 @@ _OTHER_NAMES = {
     "tier": "write accuracy=",
     "device": "write backend='cpu' or 'gpu'; results='device' leaves results on the GPU",
     **{name: f"write outputs=({name!r},)" for name in OUTPUTS},
+    **{name: f"write outputs=({output!r},)" for name, output in arguments.ALIASES.items()},
+    **dict.fromkeys(("gradients", "toc_gradients"), "write outputs=('normals', 'weights')"),
     **dict.fromkeys(
         ("d_hat", "dhat", "xi", "thickness", "margin", "min_distance"),
         "write minimum_separation= for a thickness that no step violates, and call proximity(vertices, distance) for "

@@ -122,9 +122,11 @@ class ContactArrays:
         Raises
         ------
         ValueError
-            If the node does not send `normals`, `weights` and `approach`, or if it cut the step into several parts, in
-            which vertices do not move straight from start to end.
+            If the message is about one snapshot, if the node does not send `normals`, `weights` and `approach`, or if
+            it cut the step into several parts, in which vertices do not move straight from start to end.
         """
+        if len(self.toc) != len(self):
+            raise ValueError("toc_gradients: a snapshot has no times; send the query contacts")
         for name in ("normals", "weights", "approach"):
             if len(getattr(self, name)) != len(self):
                 asked = "set the node's parameter outputs to [normals, weights]"
@@ -209,7 +211,8 @@ def scene_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
     SceneContacts
         ``vf`` (N, 2), ``vf_toc`` (N,), ``ee`` (M, 4), ``ee_toc`` (M,), ``points``, ``normals``, ``closest``,
         ``vertices``, ``weights`` and ``approach``. Responses to ``proximity`` have ``vf_distance`` and ``ee_distance``
-        instead of times, those to ``intersections`` only ``ef`` (K, 3).
+        instead of times, those to ``intersections`` only ``ef`` (K, 3). For gradients of the times, in the same rows:
+        ``contacts_from_message(message).toc_gradients()``.
 
     Raises
     ------

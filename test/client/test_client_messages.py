@@ -166,7 +166,7 @@ def test_weights_and_gradients():
     [
         (dict(normals=[]), r"the message has no normals; set the node's parameter outputs to \[normals, weights\]"),
         (dict(vertices=[], weights=[], approach=[]), "the message has no weights"),
-        (dict(toc=[], distance=[0.5, 0.25], approach=[]), "the message has no approach"),
+        (dict(toc=[], distance=[0.5, 0.25], approach=[]), "a snapshot has no times; send the query contacts"),
         (dict(parts=2, motion_bounds=[0.0, 0.0]), "the step was computed in 2 parts; with rigid_parts: 1 it has"),
     ],
 )

@@ -225,6 +225,7 @@ def test_beside_other_queries():
     "groups, error, text",
     [
         ([0, 1], ValueError, r"groups: expected shape \(72,\), a number for each vertex, got \(2,\)"),
+        ([], ValueError, r"groups: .*, got \(0,\)$"),
         ([0, 1], ValueError, r"; from one of each mesh: numpy.repeat\(groups, n\), with the numbers n of th"),
         (np.zeros(71, int), ValueError, r"groups: .*, got \(71,\)$"),
         (np.zeros((3, 72), int), ValueError, r"got \(3, 72\); all worlds have the same groups: groups\[0\]$"),
@@ -256,7 +257,7 @@ def test_wrong_positions_and_cancelled():
 
 def test_no_vertices_and_nothing_in_the_way():
     nothing = np.empty((0, 3))
-    empty = hc.Detector(hc.Scene(), backend="cpu").collision_free_motion(nothing, nothing)
+    empty = hc.Detector(hc.Scene(), backend="cpu").collision_free_motion(nothing, nothing, [])
     assert empty.vertices.shape == (0, 3)
     assert repr(empty) == "CollisionFreeMotion(0 vertices, mean factor none, 0 stuck)"
     meshes = stack(2, 6)

@@ -93,6 +93,8 @@ MISTAKES = {
     "unnamed option": (lambda: hc.Detector(scene(), "fast"), "options are given by name, as in accuracy='exact'"),
     "another option's name": (detector(min_separation=0.1), "no option 'min_separation'.*did you mean minimum_sep"),
     "an output as option": (detector(normals=True), r"no option 'normals'; write outputs=\('normals',\)$"),
+    "an array of an output as option": (detector(approach=True), r"'approach'; write outputs=\('weights',\)$"),
+    "gradients as option": (detector(gradients=True), r"'gradients'; write outputs=\('normals', 'weights'\)$"),
     "d-hat as option": (
         detector(d_hat=0.1),
         r"no option 'd_hat'; .*minimum_separation= .*proximity\(vertices, distance\)",

@@ -106,7 +106,7 @@ def test_near_pairs(node, distance):
         assert np.array_equal(getattr(got, name), getattr(expected, name)), name
     assert len(got.points) == len(got.approach) == 0
     if distance:
-        with pytest.raises(ValueError, match="toc_gradients: the message has no approach"):
+        with pytest.raises(ValueError, match="toc_gradients: a snapshot has no times"):
             client.contacts_from_message(response.contacts).toc_gradients()
     assert response.contacts.hash == expected.hash and response.contacts.total == len(expected)
     assert response.message == f"{len(expected)} pairs within {distance:g}"
