@@ -114,6 +114,23 @@ def test_points_and_normals():
     assert_same(scene, t0, t1, outputs=("points", "normals", "weights"))
 
 
+@pytest.mark.parametrize("dtype", (np.float32, np.float64))
+@pytest.mark.parametrize("make", (scenes.crumpled, scenes.lattice))
+def test_collision_free_motions(make, dtype):
+    scene, t0, t1 = scenes.join([make(np.random.default_rng(9), 16), scenes.soup(np.random.default_rng(9), 20)])
+    t0, t1 = t0.astype(dtype), t1.astype(dtype)
+    groups = np.arange(len(t0)) // 40 - 1
+    expected = hc.Detector(scene, backend="cpu").collision_free_motion(t0, t1, groups)
+    assert 0 < expected.factors.mean() < 1
+    for backend in BACKENDS:
+        detector = hc.Detector(scene, backend=backend)
+        assert detector.collision_free_motion(t0, t1, groups) == expected
+        assert len(detector.detect(t0, t1)) > 0  # its next call runs on the device again
+    cupy = pytest.importorskip("cupy")
+    detector = hc.Detector(scene, backend="gpu", results="device")
+    assert detector.collision_free_motion(cupy.asarray(t0), cupy.asarray(t1), groups) == expected
+
+
 def test_report_first_and_any():
     scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(7), 16)])
     assert_same(scene, t0, t1, report="first")
