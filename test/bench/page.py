@@ -181,13 +181,6 @@ TABLES = {
         | _whole(bytes_per_triangle="detector_bytes_per_triangle")
         | _mib(process="process_bytes"),
     ),
-    "ropes": Table(
-        ("ropes-2-cores",),
-        {"represented as": "way"}
-        | _same("edges", "triangles", "contacts")
-        | {"ms per step": "ms"}
-        | _mib(detector="bytes"),
-    ),
     "worlds-on-cpus": Table(
         ("worlds-2-cores", "worlds-16-cores"),
         _same("scene", "triangles", "threads", "worlds")
