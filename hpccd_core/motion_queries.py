@@ -126,8 +126,9 @@ class MotionQueries(Generic[MotionResult, StepResult]):
 
         Notes
         -----
-        No factor is below 0.9 times `collision_free_step`, unless rounding leaves no such position. Vertices that do
-        not move have the factor 1, or 0 if `stuck`. The returned numbers are tested at the detector's accuracy.
+        No factor is below 0.9 times `collision_free_step`, unless features touch in the rounded positions that this
+        factor of all vertices gives. Vertices that do not move have the factor 1, or 0 if `stuck`. The returned numbers
+        are tested at the detector's accuracy.
 
         Examples
         --------

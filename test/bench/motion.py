@@ -69,13 +69,15 @@ def detector_of(step, **options) -> hc.Detector:
 def of_step(result, args, name, number, step):
     start, end = step.vertices_t0.astype(float), step.vertices_t1.astype(float)
     detector = detector_of(step, backend=args.backend, threads=args.threads)
-    ways = {
+    ways = {}
+    if args.peer:
+        ways["ipctk"] = planar_of_ipctk(step.faces(), start, end, args.threads or lab.cores())
+    ways |= {
+        "after ipctk": lambda: detector.detect(start, end),  # with cold caches
         "detect": lambda: detector.detect(start, end),
         "step": lambda: detector.collision_free_step(start, end),
         "motion": lambda: detector.collision_free_motion(start, end),
     }
-    if args.peer:
-        ways["ipctk"] = planar_of_ipctk(step.faces(), start, end, args.threads or lab.cores())
     ms, found = lab.in_turn(f"{name} {number}", ways, args.repeat)
     size, motion = found["step"], found["motion"]
     ends = {"step": start + 0.9 * size * (end - start), "motion": motion.vertices, "ipctk": found.get("ipctk")}
