@@ -138,8 +138,7 @@ class MotionQueries(Generic[MotionResult, StepResult]):
         >>> _ = scene.add_mesh("falling", [[0, 1, 2]])
         >>> _ = scene.add_mesh("ground", [[0, 1, 2]], static=True)
         >>> start = np.array([[0, 0, 1], [1, 0, 3], [0, 1, 3], [-5, -5, 0], [5, -5, 0], [0, 5, 0]], float)
-        >>> end = start.copy()
-        >>> end[:3, 2] -= 2
+        >>> end = start - np.repeat([[0, 0, 2], [0, 0, 0]], 3, axis=0)
         >>> motion = hc.Detector(scene).collision_free_motion(start, end)
         >>> motion.factors.round(6).tolist()  # only the first vertex falls on the ground
         [0.45, 1.0, 1.0, 1.0, 1.0, 1.0]
