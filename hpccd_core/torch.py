@@ -42,7 +42,7 @@ class _Question:
 class _Values(torch.autograd.Function):
     @staticmethod
     def forward(question: _Question, *positions: torch.Tensor) -> torch.Tensor:
-        return torch.from_numpy(question(*(p.cpu().numpy() for p in positions))).to(positions[0].device)
+        return torch.from_numpy(question(*(p.numpy(force=True) for p in positions))).to(positions[0].device)
 
     @staticmethod
     def setup_context(ctx: Any, inputs: tuple[Any, ...], output: torch.Tensor) -> None:
@@ -93,6 +93,8 @@ def _evaluate(ask: Callable[..., Any], **positions: torch.Tensor) -> tuple[torch
             if isinstance(tensor, Mapping):
                 remedy = "use torch.cat of the meshes in the order added"
             raise TypeError(f"{name}: expected torch.Tensor, got {type(tensor).__name__}; {remedy}")
+        if tensor.layout != torch.strided:
+            raise TypeError(f"{name}: expected a dense tensor, got {tensor.layout}; convert with {name}.to_dense()")
         if tensor.dtype not in (torch.float32, torch.float64):
             raise TypeError(f"{name}: expected float32 or float64, got {tensor.dtype}; convert with {name}.double()")
     question = _Question(ask)

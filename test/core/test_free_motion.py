@@ -221,6 +221,16 @@ def test_beside_other_queries():
         other.set_separations(np.full((5, 5), 0.01 * k))
 
 
+def test_groups_of_any_integers():
+    meshes = stack(2, 6)
+    detector, ends = detector_of(meshes), (meshes.vertices_t0, meshes.vertices_t1)
+    given = [np.full(72, 3, kind) for kind in (np.int8, np.uint64, ">i4")]
+    given += [[2**63 - 1] * 72, np.broadcast_to(3, 72), np.full(144, 3)[::2]]
+    one = detector.collision_free_motion(*ends, groups=np.zeros(72, int))
+    assert one.factors.min() == one.factors.max() < 1
+    assert all(detector.collision_free_motion(*ends, groups) == one for groups in given)
+
+
 @pytest.mark.parametrize(
     "groups, error, text",
     [

@@ -204,12 +204,26 @@ def test_transforms():
         torch.func.vmap(time)(x0[None], x1[None])
 
 
+def test_tensors_in_any_memory_layout():
+    detector, start, end = falling()
+    for change in (
+        lambda x: x.repeat_interleave(2, 0)[::2],
+        lambda x: x.T.contiguous().T,
+        lambda x: torch.complex(x, -x).conj().imag,  # a view that numpy does not have: negated when it is read
+    ):
+        x = torch.tensor(start, requires_grad=True)
+        time = hct.first_time_of_impact(detector, change(x), torch.tensor(end))
+        time.backward()
+        assert time == 0.5 and x.grad[0].tolist() == [0, 0, 0.25]
+
+
 @pytest.mark.parametrize("change, message", [
     (lambda x: x.half(), "expected float32 or float64, got torch.float16; convert with vertices_t1.double()"),
     (lambda x: x.bfloat16(), "expected float32 or float64, got torch.bfloat16; convert with vertices_t1.double()"),
     (lambda x: x.int(), "expected float32 or float64, got torch.int32; convert with vertices_t1.double()"),
     (lambda x: {"faces": x}, "expected torch.Tensor, got dict; use torch.cat of the meshes in the order added"),
     (lambda x: x.numpy(), "expected torch.Tensor, got ndarray; use torch.as_tensor(vertices_t1)"),
+    (lambda x: x.to_sparse(), "expected a dense tensor, got torch.sparse_coo; convert with vertices_t1.to_dense()"),
     (lambda x: x.T, "expected shape (6, 3), "),
     (lambda x: x[:5], "expected shape (6, 3), "),
 ])  # fmt: skip

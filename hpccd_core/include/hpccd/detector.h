@@ -82,8 +82,7 @@ class HPCCD_API Detector {
   DeviceResults proximity_on_device(Positions vertices, double distance);
   DeviceResults intersections_on_device(Positions vertices);
   /// A detection on fixed device arrays that a CUDA graph can contain. Its lists and rows have `room` times, 1 to 1000,
-  /// the size that the present motion in the arrays needs. Throws InvalidArgument if outputs are requested, and
-  /// std::runtime_error if the device fails.
+  /// the size that the present motion in the arrays needs. Throws std::runtime_error if the device fails.
   std::unique_ptr<PreparedDetection> prepare(Positions vertices_t0, Positions vertices_t1, double room);
 
   /// As Scene::set_separation, from the next call on. Nothing is rebuilt.
