@@ -170,6 +170,10 @@ def contacts_from_message(message: ContactArray) -> ContactArrays:
         name: field(message, name, dtype, (count if len(getattr(message, name)) else 0, *row))
         for name, (row, dtype) in _OPTIONAL.items()
     }
+    sent = {array.asked for name, array in OUTPUT_ARRAYS.items() if len(optional[name])}
+    for name, array in OUTPUT_ARRAYS.items():
+        if array.asked in sent and not len(optional[name]) and not (of_snapshot and name == "approach"):
+            raise ValueError(f"message: {name} is empty, though other arrays of the output {array.asked} are not")
     return ContactArrays(
         tuple(message.mesh_names),
         n_vertex_face,

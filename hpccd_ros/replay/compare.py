@@ -105,6 +105,10 @@ def _malformed(message, layout) -> str | None:
     for name, array in OUTPUT_ARRAYS.items():
         if len(getattr(message, name)) not in (0, math.prod(array.row) * count):
             return f"{name} has {len(getattr(message, name))} entries for {count} contacts"
+    sent = recorded_outputs(message)
+    for name, array in OUTPUT_ARRAYS.items():
+        if array.asked in sent and not len(getattr(message, name)):
+            return f"{name} is empty, though other arrays of the output {array.asked} are not"
     if len(message.distance):
         return f"distance has {len(message.distance)} entries; contacts of a step have none"
     kind = np.frombuffer(message.kind, np.uint8)

@@ -257,6 +257,9 @@ def test_distances_whose_arrays_do_not_fit_together(changes, text):
         (dict(vertices=[0] * 7), r"vertices has 7 values, 8 were expected for shape \(2, 4\)"),
         (dict(weights=[0.0] * 4), r"weights has 4 values, 8 were expected for shape \(2, 4\)"),
         (dict(approach=[0.0] * 3), r"approach has 3 values, 2 were expected for shape \(2,\)"),
+        (dict(approach=[0.0] * 2), "vertices is empty, though other arrays of the output weights are not"),
+        (dict(vertices=[0] * 8, weights=[0.0] * 8), "approach is empty, though other arrays of the output weights are"),
+        (dict(vertices=[0] * 8, toc=[], distance=[0.5, 0.25]), "weights is empty, though other arrays of the output"),
         (dict(mesh_b=[1, 2]), "mesh_b names a mesh beyond the 2 of mesh_names"),
     ],
 )

@@ -218,3 +218,14 @@ def test_pictures_of_scenes_beyond_single_precision(sound_bags, tmp_path, factor
     decoded(bag, "/meshes/cloth/vertices", _First(), change, all_of_them=True)
     done = hpccd("view", bag.write(tmp_path / "x.mcap"), "-o", tmp_path / "x.png")
     assert done.status == 0 and not done.err, done
+
+
+@pytest.mark.parametrize("name", ["vertices", "weights", "approach"])
+def test_one_array_of_an_output_left_out(with_change, name):
+    """The node sends all arrays of an output or none."""
+
+    def change(put, result):
+        put(name, getattr(result, name)[:0])
+
+    done = with_change(change, "everything.mcap")
+    assert done.status == 1 and f"malformed: {name} is empty" in done.out, done.out
