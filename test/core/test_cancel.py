@@ -138,6 +138,16 @@ def test_within_10_ms(case):
     )
 
 
+@pytest.mark.parametrize("case", ["batches", "last resorts", "many contacts", "building"])
+def test_collision_free_motions_within_10_ms(case):
+    make, options = CASES[case]
+    scene, start, end = make()
+    assert_within_10_ms(
+        lambda: hc.Detector(scene, backend="cpu", threads=1, **options),
+        lambda detector: detector.collision_free_motion(start, end),
+    )
+
+
 @pytest.mark.parametrize("case", SNAPSHOTS)
 def test_snapshots_within_10_ms(case):
     make, ask = SNAPSHOTS[case]
