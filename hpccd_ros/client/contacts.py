@@ -221,7 +221,8 @@ def scene_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
     Raises
     ------
     ValueError
-        If the layout is of other meshes, or of other versions of their topologies.
+        If the layout is of other meshes, or of other versions of their topologies, or has fewer features than the
+        message names.
     """
     contacts = contacts_from_message(message)
     if contacts.mesh_names != layout.mesh_names:
@@ -229,6 +230,8 @@ def scene_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
             f"layout: it is of the meshes {', '.join(layout.mesh_names)}, the message of "
             f"{', '.join(contacts.mesh_names)}; create it from these, in this order"
         )
+    if problem := contact_messages.beyond_meshes(message, layout):
+        raise ValueError(f"message: {problem}")
     return contact_messages.read_contacts(message, layout)
 
 

@@ -65,9 +65,44 @@ def fill_outputs(message: ContactArray, sent: dict[str, NDArray[Any]], layout: L
 
 def _first_vertices(message: ContactArray, layout: Layout) -> NDArray[np.int64]:
     """(N, 4): scene-wide number of the first vertex of the mesh of each entry in ``vertices``."""
-    of_a, of_b = (layout.vertex_offsets[np.frombuffer(m, np.uint32)] for m in (message.mesh_a, message.mesh_b))
+    return _of_meshes_of_corners(message, layout.vertex_offsets)
+
+
+def _of_meshes_of_corners(message: ContactArray, by_mesh: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(N, 4): the number of the mesh of each entry in ``vertices``."""
+    of_a, of_b = (by_mesh[np.frombuffer(m, np.uint32)] for m in (message.mesh_a, message.mesh_b))
     second = np.where(np.frombuffer(message.kind, np.uint8) == ContactArray.VERTEX_FACE, of_b, of_a)
     return np.stack([of_a, second, of_b, of_b], 1)
+
+
+def beyond_meshes(message: ContactArray, layout: Layout) -> str | None:
+    """In words, a mesh, feature or vertex that does not exist, or None; of a message whose arrays fit together.
+
+    In scene-wide indices they could be mistaken for others.
+    """
+    kind, of_vertices = np.frombuffer(message.kind, np.uint8), np.diff(layout.vertex_offsets)
+    corners = np.frombuffer(message.vertices, np.uint32).reshape(-1, 4)
+    for side, alone, counts in (
+        ("a", kind == ContactArray.VERTEX_FACE, of_vertices),
+        ("b", kind != ContactArray.EDGE_EDGE, np.diff(layout.face_offsets)),
+    ):
+        mesh = np.frombuffer(getattr(message, f"mesh_{side}"), np.uint32)
+        feature = np.frombuffer(getattr(message, f"features_{side}"), np.uint32).reshape(-1, 2)
+        if (mesh >= len(layout.mesh_names)).any():
+            return f"mesh_{side} names mesh {mesh.max()} of {len(layout.mesh_names)}"
+        first = np.where(alone, counts[mesh], of_vertices[mesh])
+        wrong = (feature[:, 0] >= first) | np.where(alone, feature[:, 1] != message.NONE, feature[:, 1] >= first)
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            return (
+                f"features_{side} of contact {row} are {feature[row].tolist()}, in mesh {layout.mesh_names[mesh[row]]}"
+            )
+    if len(corners):
+        wrong = (corners >= _of_meshes_of_corners(message, of_vertices)).any(1)
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            return f"vertices of contact {row} are {corners[row].tolist()}, beyond those of their meshes"
+    return None
 
 
 def read_pairs(message: ContactArray, layout: Layout) -> FeaturePairs:

@@ -114,26 +114,7 @@ def _malformed(message, layout) -> str | None:
     kind = np.frombuffer(message.kind, np.uint8)
     if (kind > message.EDGE_EDGE).any() or (np.diff(kind.astype(np.int16)) < 0).any():
         return "kind is not a run of vertex-face followed by a run of edge-edge"
-    for side, of_vertex_face in (("a", layout.vertex_offsets), ("b", layout.face_offsets)):
-        if problem := _misnamed(message, side, of_vertex_face, kind, layout):
-            return problem
-    return None
-
-
-def _misnamed(message, side, of_vertex_face, kind, layout) -> str | None:
-    """Names of meshes or features that do not exist. Converted to scene-wide indices, they could be mistaken for
-    others."""
-    mesh = np.frombuffer(getattr(message, f"mesh_{side}"), np.uint32)
-    feature = np.frombuffer(getattr(message, f"features_{side}"), np.uint32).reshape(-1, 2)
-    if (mesh >= len(layout.mesh_names)).any():
-        return f"mesh_{side} names mesh {mesh.max()} of {len(layout.mesh_names)}"
-    vertex_face = kind == message.VERTEX_FACE
-    first = np.where(vertex_face, np.diff(of_vertex_face)[mesh], np.diff(layout.vertex_offsets)[mesh])
-    wrong = (feature[:, 0] >= first) | np.where(vertex_face, feature[:, 1] != message.NONE, feature[:, 1] >= first)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        return f"features_{side} of contact {row} are {feature[row].tolist()}, in mesh {layout.mesh_names[mesh[row]]}"
-    return None
+    return contact_messages.beyond_meshes(message, layout)
 
 
 def _not_any(recorded, contacts, layout) -> str | None:

@@ -268,6 +268,27 @@ def test_contacts_whose_arrays_do_not_fit_together(changes, text):
         client.contacts_from_message(two_contacts(**changes))
 
 
+@pytest.mark.parametrize(
+    "changes, text",
+    [
+        (
+            dict(vertices=[2, 0, 1, 3, 0, 1, 1, 2]),
+            r"vertices of contact 0 are \[2, 0, 1, 3\], beyond those of their meshes",
+        ),
+        (dict(vertices=[2, 0, 1, 2, 0, 2**32 - 1, 1, 2]), r"vertices of contact 1 are \[0, 4294967295, 1, 2\]"),
+        (dict(features_a=[3, ContactArray.NONE, 0, 1]), r"features_a of contact 0 are \[3, 4294967295\], in mesh a"),
+        (
+            dict(features_b=[0, ContactArray.NONE, 1, 2**32 - 2]),
+            r"features_b of contact 1 are \[1, 4294967294\], in mesh b",
+        ),
+        (dict(features_b=[1, ContactArray.NONE, 1, 2]), r"features_b of contact 0 are \[1, 4294967295\], in mesh b"),
+    ],
+)
+def test_contacts_of_features_that_do_not_exist(changes, text):
+    with pytest.raises(ValueError, match=f"message: {text}"):
+        client.scene_contacts(with_weights(**changes), layout("a", "b"))
+
+
 def test_a_layout_needs_a_topology_for_each_mesh():
     with pytest.raises(ValueError, match="topologies: 0 of 1 meshes"):
         client.Layout.of(("cloth",), ())
