@@ -4,6 +4,7 @@
 What counts is the time of a processor, which unlike that on a clock hardly depends on how busy the machine is.
 """
 
+import functools
 import threading
 import time
 
@@ -146,6 +147,42 @@ def test_collision_free_motions_within_10_ms(case):
         lambda: hc.Detector(scene, backend="cpu", threads=1, **options),
         lambda detector: detector.collision_free_motion(start, end),
     )
+
+
+def comb(n):
+    """n points fall through n triangles: few features, whose contacts are found at once and then shortened."""
+    scene = hc.Scene()
+    scene.add_mesh("points", np.empty((0, 3), int), n_vertices=n)
+    scene.add_mesh("stack", np.arange(3 * n).reshape(-1, 3), self_collision=False)
+    corners = np.array([[-1, -1, 0], [2, -1, 0], [-1, 2, 0]]) + np.linspace(0, 1, n)[:, None, None] * [0, 0, 1]
+    points = np.random.default_rng(0).uniform(-0.5, 0, (n, 3)) + [0, 0, 2]
+    start = np.concatenate([points, corners.reshape(-1, 3)])
+    return scene, start, np.concatenate([points - [0, 0, 4], corners.reshape(-1, 3)])
+
+
+@pytest.mark.parametrize("case", ["batches", "last resorts", "many contacts", "building"])
+def test_collision_free_motions_within_10_ms(case):
+    make, options = CASES[case]
+    scene, start, end = make()
+    assert_within_10_ms(
+        lambda: hc.Detector(scene, backend="cpu", threads=1, **options),
+        lambda detector: detector.collision_free_motion(start, end),
+    )
+
+
+def test_the_shortening_of_many_pairs_within_10_ms():
+    """Between the searches all contacts are gone through once in each round."""
+    scene, start, end = comb(2_500)
+    begun = time.perf_counter()
+    hc.Detector(scene, backend="cpu", threads=1, **FAST).collision_free_motion(start, end)
+    whole = time.perf_counter() - begun
+    took = []
+    for place in np.linspace(0.1, 0.9, 16):
+        detector = hc.Detector(scene, backend="cpu", threads=1, **FAST)
+        ask = functools.partial(detector.collision_free_motion, start, end)
+        took.append(cancelled_after(detector, ask, place * whole))
+    late = [ms for ms in took if ms is not None and ms > 10]
+    assert len(late) <= 2, took
 
 
 @pytest.mark.parametrize("case", SNAPSHOTS)

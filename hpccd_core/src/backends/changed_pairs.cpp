@@ -48,7 +48,8 @@ void ChangedPairs::join(ThreadPool& pool) {
       sizes[to] += group.first.size();
     }
   for (std::size_t i = 0; i < sizes.size(); ++i)
-    candidates_[i].pairs.first.resize(sizes[i]), candidates_[i].pairs.second.resize(sizes[i]);
+    for (const auto features : {&PairGroup::first, &PairGroup::second})
+      resize(candidates_[i].pairs.*features, sizes[i], pool.cancellation());
   parallel_for_each(pool, parts.size(), [&](std::size_t i) {
     const auto& [from, to, at] = parts[i];
     for (const auto features : {&PairGroup::first, &PairGroup::second}) {
@@ -56,7 +57,9 @@ void ChangedPairs::join(ThreadPool& pool) {
       if (source.size() == target.size())
         source.swap(target);  // the only one
       else
-        std::ranges::copy(source, target.data() + at);
+        in_pieces(pool.cancellation(), source.size(), 1 << 18, [&](std::size_t begin, std::size_t end) {
+          std::copy(source.data() + begin, source.data() + end, target.data() + at + begin);
+        });
     }
   });
 }
@@ -81,9 +84,11 @@ void ChangedPairs::mark(std::span<const std::uint32_t> vertices) {
 }
 
 void ChangedPairs::list_by_feature(ThreadPool& pool) {
-  const auto list = [](Adjacency& lists, std::size_t n, const std::vector<std::uint32_t>& features) {
+  const auto list = [&](Adjacency& lists, std::size_t n, const std::vector<std::uint32_t>& features) {
     lists.assign(n, [&](auto&& take) {
-      for (std::uint32_t i = 0; i < features.size(); ++i) take(features[i], i);
+      in_pieces(pool.cancellation(), features.size(), 1 << 18, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) take(features[i], static_cast<std::uint32_t>(i));
+      });
     });
   };
   parallel_for_each(pool, 2 * candidates_.size(), [&](std::size_t i) {

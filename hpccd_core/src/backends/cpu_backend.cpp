@@ -307,7 +307,7 @@ std::optional<std::vector<double>> CpuBackend::earliest(Positions t0, Positions 
 
 std::optional<CollisionFreeMotion> CpuBackend::free_motion(Positions t0, Positions t1,
                                                            std::span<const std::int64_t> groups) {
-  Shortening motion(t0, t1, groups);
+  Shortening motion(t0, t1, groups, shared_.cancellation);
   while (shorten_to_rest(t0, motion)) {
     begin_motion(t0, motion.end(), Tests::all_here);
     search_->report = Report::all, counts_.earliest = false;
@@ -355,15 +355,21 @@ void CpuBackend::search_whole_ways(Positions t0, Positions t1) {
 }
 
 std::span<const Shortening::Touching> CpuBackend::touching() {
-  touching_.clear();
+  std::size_t n = 0;
+  for (const Worker& w : workers_) n += w.vertex_face.size() + w.edge_edge.size();
+  resize(touching_, n, shared_.cancellation);
+  auto pair = touching_.begin();
   for (const Worker& w : workers_)
     for (const auto& [list, kind] :
          {std::pair(&w.vertex_face, Kind::vertex_face), std::pair(&w.edge_edge, Kind::edge_edge)})
-      for (const Contact& c : *list) {
-        Shortening::Touching& pair = touching_.emplace_back();
-        pair_vertices(search_->geometry, kind, c.first, c.second, pair.vertices);
-        pair.toc = c.toc;
-      }
+      in_pieces(shared_.cancellation, list->size(), 1 << 14,
+                [&, list = list, kind = kind](std::size_t begin, std::size_t end) {
+                  for (std::size_t i = begin; i < end; ++i, ++pair) {
+                    const Contact& c = (*list)[i];
+                    pair_vertices(search_->geometry, kind, c.first, c.second, pair->vertices);
+                    pair->toc = c.toc;
+                  }
+                });
   return touching_;
 }
 

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "base/cancellation.h"
 #include "hpccd/hpccd.h"
 
 namespace hpccd {
@@ -17,7 +18,7 @@ namespace hpccd {
 class Shortening {
  public:
   // Host positions of one world. groups: by vertex, -1 or a number; vertices with the same number share a factor.
-  Shortening(Positions t0, Positions t1, std::span<const std::int64_t> groups);
+  Shortening(Positions t0, Positions t1, std::span<const std::int64_t> groups, const Cancellation& cancellation);
 
   struct Touching {
     std::uint32_t vertices[4];
@@ -34,6 +35,7 @@ class Shortening {
   void take(const Touching& pair, double part);
 
   const Positions t0_, t1_;
+  const Cancellation& cancellation_;
   std::vector<double> ends_;
   std::vector<float> float_ends_;     // for positions in floats
   std::vector<std::uint32_t> slots_;  // by vertex, of its factor; empty: its own number

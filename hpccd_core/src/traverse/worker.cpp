@@ -11,6 +11,11 @@
 #include "elementary/undecided.h"
 
 namespace hpccd {
+namespace {
+
+constexpr std::size_t many = 1 << 16;  // entries of a list, which must not grow without heeding a cancellation
+
+}  // namespace
 
 void Worker::begin(Search& search) {
   search_ = &search;
@@ -94,6 +99,8 @@ void Worker::keep(const std::uint32_t* first, const std::uint32_t* second, std::
   auto group = std::ranges::find_if(
       *kept, [&](const PairGroup& g) { return g.kind == kind && g.rule.number() == rule.number(); });
   if (group == kept->end()) group = kept->insert(kept->end(), {kind, rule, {}, {}});
+  for (std::vector<std::uint32_t>* list : {&group->first, &group->second})
+    if (list->capacity() - list->size() < n && list->size() >= many) grow(*list, *search_->cancellation);
   group->first.insert(group->first.end(), first, first + n);
   group->second.insert(group->second.end(), second, second + n);
 }
@@ -102,7 +109,6 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
   heed_cancellation();
   if (kept) keep(first, second, n, kind, rule);
   std::vector<Contact>& list = found(kind);
-  constexpr std::size_t many = 1 << 16;
   if (list.capacity() - list.size() < n && list.size() >= many) grow(list, *search_->cancellation);
   BatchResult& r = *result_;
   BatchCounts& count = counts[static_cast<int>(kind)];
