@@ -160,16 +160,6 @@ def comb(n):
     return scene, start, np.concatenate([points - [0, 0, 4], corners.reshape(-1, 3)])
 
 
-@pytest.mark.parametrize("case", ["batches", "last resorts", "many contacts", "building"])
-def test_collision_free_motions_within_10_ms(case):
-    make, options = CASES[case]
-    scene, start, end = make()
-    assert_within_10_ms(
-        lambda: hc.Detector(scene, backend="cpu", threads=1, **options),
-        lambda detector: detector.collision_free_motion(start, end),
-    )
-
-
 def test_the_shortening_of_many_pairs_within_10_ms():
     """Between the searches all contacts are gone through once in each round."""
     scene, start, end = comb(2_500)
