@@ -60,7 +60,7 @@ class ChangedPairs {
   }
 
  private:
-  // With fewer changed vertices than one in so many, lists by feature save more time than they take.
+  // Up to this part of the vertices, 1/64, lists by feature save more time than they cost.
   static constexpr std::size_t scan_above = 64;
   // As bits, those of a scene of 100,000 triangles fit into a core's cache.
   struct Marks {

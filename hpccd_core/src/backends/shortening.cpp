@@ -22,7 +22,8 @@ float rounded_towards(double x, float start) {
   return beyond ? std::nextafter(nearest, start) : nearest;
 }
 
-// Of the motion of a pair, per round: enough that rounding errors do not matter, and that few rounds are needed.
+// The part of the time before contact that a pair keeps in a round: rounding errors do not matter, and few rounds
+// suffice.
 constexpr double kept = 0.9;
 // Chains of vertices that push each other have taken up to 60 rounds; after that many, pairs go to the floor at once.
 constexpr int most_rounds = 100;

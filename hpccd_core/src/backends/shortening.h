@@ -11,10 +11,9 @@
 
 namespace hpccd {
 
-// Each round takes the pairs that touch in the motion as it is now. Their vertices keep 0.9 of what plain shortening
-// leaves, but not less than `floor`, at which all vertices alike would touch nothing. So every vertex keeps at least
-// the part that a step of one length for all would give it, and pairs at that length are free of each other; only a
-// pair whose rounded ends touch goes below.
+// Each round shortens the pairs that touch in the present motion. Their vertices keep 0.9 of the part before contact,
+// but not less than the floor: 0.9 of the step that is free of contacts if all vertices take it. Pairs at the floor do
+// not touch; only a pair whose rounded ends do goes below it.
 class Shortening {
  public:
   // Host positions of one world. groups: by vertex, -1 or a number; vertices with the same number share a factor.

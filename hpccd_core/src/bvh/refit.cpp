@@ -93,7 +93,7 @@ void grow(Kdop& kdop, const KdopMargin& by) {
   for (int k = 0; k < 2 * n_kdop_directions; ++k) kdop.low[k] -= by.in[k], kdop.high[k] += by.in[k];
 }
 
-// As MotionBounds::of_any_part says of boxes.
+// The bounds at the end then contain those at the start (MotionBounds::of_any_part).
 void contain_start(Kdop& kdop) {
   for (int t0 = 0; t0 < n_kdop_directions; ++t0) {
     const int t1 = t0 + n_kdop_directions;

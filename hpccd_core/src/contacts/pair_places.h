@@ -9,7 +9,7 @@
 namespace hpccd {
 
 // The derivative of the gap along the normal, at the time of these places. Where the features graze each other it would
-// be rounding errors of the motion: these count as 0, so that nobody divides by them. So does a positive one of a
+// be rounding errors of the motion: these count as 0, because gradients divide by it. So does a positive one of a
 // contact within the step: features that touch there for the first time have approached each other.
 template <Kind kind>
 HPCCD_HD double approach_of(const Vec3<double> t0[4], const Vec3<double> t1[4], double toc, Places at,
