@@ -14,7 +14,8 @@ import sys
 from pathlib import Path
 
 # The direction of the data. Files outside the folders (detector.cpp, bindings.cpp) come last.
-FOLDERS = ["base", "rigid", "scene", "bvh", "elementary", "traverse", "contacts", "paper", "gpu", "hybrid", "backends"]
+FOLDERS = ["base", "rigid", "scene", "bvh", "elementary", "traverse", "contacts", "solid", "paper", "gpu", "hybrid"]
+FOLDERS += ["backends"]
 TOP = "the files beside the folders"
 ORDER = [*FOLDERS, TOP]
 PUBLIC = "hpccd"  # include/hpccd: the public interface, for all
