@@ -36,25 +36,32 @@ from .scenes import (
     proximity,
     smallest_distances,
 )
+from .solids import closed, contained, convex_depths, edge_face_points, separating_translations, winding_numbers
 
 __all__ = [
     "Contacts",
     "Gap",
     "Proximity",
     "brute_force",
+    "closed",
+    "contained",
+    "convex_depths",
     "distance_edge_edge",
     "distance_vertex_face",
     "earliest_contacts",
     "edge_edge",
     "edge_face_intersect",
+    "edge_face_points",
     "intersections",
     "proximity",
+    "separating_translations",
     "separation_edge_edge",
     "separation_vertex_face",
     "smallest_distances",
     "squared_distance_edge_edge",
     "squared_distance_vertex_face",
     "vertex_face",
+    "winding_numbers",
     "within_edge_edge",
     "within_vertex_face",
 ]

@@ -12,10 +12,13 @@
 #include "brute_force.h"
 #include "distance.h"
 #include "earliest.h"
+#include "edge_face_point.h"
 #include "elementary.h"
 #include "intersection.h"
 #include "parallel.h"
 #include "separation.h"
+#include "translation.h"
+#include "winding.h"
 
 namespace py = pybind11;
 
@@ -117,6 +120,10 @@ oracle::Meshes meshes_of(const Array<std::uint32_t>& faces, const Array<std::uin
   return {rows<oracle::Face>(faces), rows<oracle::Edge>(edges), mesh_of_vertex, tested};
 }
 
+oracle::OneMesh one_mesh(const Array<double>& vertices, const Array<std::uint32_t>& faces, bool closed) {
+  return {rows<oracle::Point>(vertices), rows<oracle::Triangle>(faces), closed};
+}
+
 template <class Of>
 auto without_gil(Of of) {
   py::gil_scoped_release release;
@@ -176,5 +183,38 @@ PYBIND11_MODULE(_oracle, m) {
     for (const oracle::Gap& gap : without_gil([&] { return oracle::smallest_distances(meshes, positions, threads); }))
       list.append(py::make_tuple(gap.mesh_a, gap.mesh_b, gap.distance, gap.intersect));
     return list;
+  });
+  m.def("winding_numbers", [](const Array<double>& vertices, const Array<std::uint32_t>& faces,
+                              const Array<double>& points, unsigned threads) {
+    const auto mesh = one_mesh(vertices, faces, true);
+    const auto at = rows<Point>(points);
+    const auto found = without_gil([&] { return oracle::winding_numbers(mesh.vertices, mesh.faces, at, threads); });
+    return py::make_tuple(column(found.numbers), column(found.on_surface));
+  });
+  py::class_<oracle::OneMesh>(m, "OneMesh").def(py::init(&one_mesh));
+  using MeshPair = std::pair<oracle::OneMesh, oracle::OneMesh>;
+  m.def("separating_translations",
+        [](const std::vector<MeshPair>& pairs, const Array<double>& directions, unsigned threads) {
+          const auto d = rows<Point>(directions);
+          return computed<double>(pairs.size(), threads, [&](std::size_t i) {
+            return oracle::separating_translation(pairs[i].first, pairs[i].second, d[i]);
+          });
+        });
+  m.def("convex_depths", [](const std::vector<MeshPair>& pairs, unsigned threads) {
+    return computed<double>(pairs.size(), threads,
+                            [&](std::size_t i) { return oracle::convex_depth(pairs[i].first, pairs[i].second); });
+  });
+  // (Q,7): edge parameter, barycentric coordinates, point; NaN where edge and face share no point.
+  m.def("edge_face_points", [](const Array<double>& points, unsigned threads) {
+    std::array<double, 7> none;
+    none.fill(std::numeric_limits<double>::quiet_NaN());
+    const auto list = rows<std::array<Point, 5>>(points);
+    std::vector<std::array<double, 7>> found(list.size(), none);
+    without_gil([&] {
+      oracle::parallel_for(list.size(), threads,
+                           [&](std::size_t i) { found[i] = oracle::edge_face_point(list[i]).value_or(none); });
+      return 0;
+    });
+    return columns(found);
   });
 }
