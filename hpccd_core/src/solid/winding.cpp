@@ -9,24 +9,12 @@
 #include "elementary/exact/integers.h"
 #include "elementary/exact/intersection.h"
 #include "elementary/exact/vector.h"
+#include "solid/crossing.h"
 
 namespace hpccd {
 namespace {
 
 using V = Vec3<double>;
-
-// How the ray from a point along +x crosses a triangle: `turn` is 1 if the corners are counterclockwise seen against
-// the ray's direction, -1 if clockwise, 0 without a crossing of the ray's line. `ahead`: sign of the crossing's x minus
-// that of the point; 0: the point is on the triangle, or may be on it if there is no crossing.
-//
-// The line never meets an edge or a vertex: the point counts as moved by (eps, eps^2) along y and z, with an
-// infinitesimal eps (Edelsbrunner and Muecke 1990). An orientation in the plane of y and z that is zero then has the
-// sign of its derivative with respect to the point's y, or else to its z. The two faces of an edge see it alike.
-struct Crossing {
-  int turn, ahead;
-};
-
-int sign_of(double x) { return (x > 0) - (x < 0); }
 
 // The orientation of the point and two corners b, c that it has after the move, if it is zero before: the derivatives
 // are b.z - c.z and c.y - b.y.
@@ -74,40 +62,6 @@ Crossing crossing(const V q[4]) {
 
 namespace {
 
-// Error bounds (Shewchuk 1997): with u = 2^-53, an orientation in the plane is computed from rounded differences within
-// (3 + 16 u) u of the sum of its products' magnitudes, a volume within (7 + 56 u) u. Products that underflow add less
-// than `least` each, times a coordinate in a volume. An overflow makes a comparison false.
-constexpr double in_plane = 3.4e-16, in_space = 7.8e-16, least = 2.3e-308;
-
-// q: the point and three corners.
-Crossing crossing(const V q[4]) {
-  const V a = q[1] - q[0], b = q[2] - q[0], c = q[3] - q[0];
-  double orientation[3], size[3];
-  int turn = 0;
-  const V* corners[4] = {&a, &b, &c, &a};
-  bool certain = true;
-  for (int i = 0; i < 3; ++i) {
-    const V &from = *corners[i], &to = *corners[i + 1];
-    const double left = from.y * to.z, right = from.z * to.y;
-    orientation[i] = left - right, size[i] = std::fabs(left) + std::fabs(right);
-    if (!(std::fabs(orientation[i]) > in_plane * size[i] + least)) {
-      certain = false;
-      continue;
-    }
-    const int s = sign_of(orientation[i]);
-    if (s == -turn) return {0, 1};  // strictly outside in the plane
-    turn = s;
-  }
-  if (!certain) return exact::crossing(q);
-  if (a.x > 0 && b.x > 0 && c.x > 0) return {turn, 1};
-  if (a.x < 0 && b.x < 0 && c.x < 0) return {turn, -1};
-  const double volume = a.x * orientation[1] + b.x * orientation[2] + c.x * orientation[0];
-  const double bound = in_space * (std::fabs(a.x) * size[1] + std::fabs(b.x) * size[2] + std::fabs(c.x) * size[0]) +
-                       4 * least * (1 + std::fabs(a.x) + std::fabs(b.x) + std::fabs(c.x));
-  if (!(std::fabs(volume) > bound)) return exact::crossing(q);
-  return {turn, turn * sign_of(volume)};
-}
-
 bool on_triangle(const V q[4]) {
   const V point_and_face[5] = {q[0], q[0], q[1], q[2], q[3]};
   return exact::intersect(point_and_face);
@@ -139,7 +93,8 @@ Winding winding_number(const Tree& tree, const MotionBounds& snapshot, const Fea
     const auto x = std::minmax({q[1].x, q[2].x, q[3].x});
     if (point.y < y.first || point.y > y.second || point.z < z.first || point.z > z.second || point.x > x.second)
       return true;
-    const Crossing c = crossing(q);
+    Crossing c = crossing(q);
+    if (!c.certain) c = exact::crossing(q);
     winding.on_surface = c.ahead == 0 && (c.turn != 0 || (point.x >= x.first && on_triangle(q)));
     if (c.turn != 0 && c.ahead > 0) winding.number += c.turn;
     return !winding.on_surface;
