@@ -2,9 +2,11 @@
 #include "solid/winding.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <vector>
 
+#include "base/simd/four.h"
 #include "elementary/exact/boxes.h"
 #include "elementary/exact/integers.h"
 #include "elementary/exact/intersection.h"
@@ -42,8 +44,8 @@ Crossing crossing(const V q[4], const OddMantissa at[3][4], const int low[3]) {
   return {turn, turn * sign(dot(to[0], cross(to[1], to[2])))};
 }
 
-// Bits as in exact/intersection.cpp.
-Crossing crossing(const V q[4]) {
+// Bits as in exact/intersection.cpp. Rarely needed: inlined, it would also make GCC 12 warn of sizes that do not occur.
+[[gnu::noinline]] Crossing crossing(const V q[4]) {
   OddMantissa at[3][4];
   int low[3], bits = 1;
   for (int k = 0; k < 3; ++k) {
@@ -72,48 +74,112 @@ V position(const MotionBounds& snapshot, std::uint32_t vertex) {
   return {x[0], x[1], x[2]};
 }
 
+double least_of(double a, double b, double c) { return std::min(std::min(a, b), c); }
+double greatest_of(double a, double b, double c) { return std::max(std::max(a, b), c); }
+
+// Rays along an axis from points near each other. They go along x where the points are on that side of the middle, else
+// against it: there are fewer faces that way.
+class Rays {
+ public:
+  Rays(const Tree& tree, const MotionBounds& snapshot, const Features& features, std::span<const V> points,
+       std::span<Winding> found)
+      : tree_(tree), snapshot_(snapshot), features_(features), points_(points), found_(found) {
+    for (int k = 0; k < 3; ++k) {
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        const double x = exact::coordinate(points[i], k);
+        at_[k][i] = snapshot.squeezed.empty() ? snapshot.map(x, k) : snapshot.squeezed[static_cast<std::size_t>(k)](x);
+      }
+      const auto [low, high] = std::minmax_element(at_[k], at_[k] + points.size());
+      around_.low[k] = *low, around_.high[k] = *high;
+    }
+    const Box& whole = tree.nodes[0].box.t0;
+    backwards_ = around_.low[0] + around_.high[0] < whole.low[0] + whole.high[0];
+    std::ranges::fill(found, Winding{0, false});
+  }
+
+  void search(std::uint32_t mesh) {
+    std::vector<std::uint32_t> stack{0};
+    while (!stack.empty()) {
+      const Node& node = tree_.nodes[stack.back()];
+      stack.pop_back();
+      if ((node.mesh != mixed_meshes && node.mesh != mesh) || !may_meet(node.box.t0)) continue;
+      if (node.children)
+        stack.push_back(node.children + 1), stack.push_back(node.children);
+      else if (const unsigned which = that_may_meet(node.box.t0))
+        test(tree_.leaves[node.leaf], which);
+    }
+    for (Winding& w : found_)
+      if (w.on_surface) w.number = 0;
+  }
+
+ private:
+  bool may_meet(const Box& box) const {
+    return (around_.high[1] >= box.low[1]) & (around_.low[1] <= box.high[1]) & (around_.high[2] >= box.low[2]) &
+           (around_.low[2] <= box.high[2]) &
+           (backwards_ ? around_.high[0] >= box.low[0] : around_.low[0] <= box.high[0]);
+  }
+
+  // Bit i: the ray of point i.
+  unsigned that_may_meet(const Box& box) const {
+    unsigned which = 0;
+    const auto all = [](float x) { return Floats4{x, x, x, x}; };
+    for (std::size_t i = 0; i < points_.size(); i += 4) {
+      const Floats4 x = load4(at_[0] + i), y = load4(at_[1] + i), z = load4(at_[2] + i);
+      const Mask4 ahead = backwards_ ? x >= all(box.low[0]) : x <= all(box.high[0]);
+      which |= bits4(ahead & (y >= all(box.low[1])) & (y <= all(box.high[1])) & (z >= all(box.low[2])) &
+                     (z <= all(box.high[2])))
+               << i;
+    }
+    return which & ((1u << points_.size()) - 1);
+  }
+
+  void test(const LeafRange& leaf, unsigned which) {
+    V q[4];
+    for (std::uint32_t slot = leaf.first_face; slot < leaf.end_face; ++slot) {
+      const auto& corners = features_.faces[tree_.face_of_slot[slot]];
+      for (std::size_t i = 0; i < 3; ++i) q[1 + i] = position(snapshot_, corners[i]);
+      const V low{least_of(q[1].x, q[2].x, q[3].x), least_of(q[1].y, q[2].y, q[3].y), least_of(q[1].z, q[2].z, q[3].z)};
+      const V high{greatest_of(q[1].x, q[2].x, q[3].x), greatest_of(q[1].y, q[2].y, q[3].y),
+                   greatest_of(q[1].z, q[2].z, q[3].z)};
+      for (unsigned left = which; left != 0; left &= left - 1) {
+        const auto i = static_cast<std::size_t>(std::countr_zero(left));
+        const V& p = points_[i];
+        if ((p.y < low.y) | (p.y > high.y) | (p.z < low.z) | (p.z > high.z) | (backwards_ ? p.x < low.x : p.x > high.x))
+          continue;
+        q[0] = p;
+        Crossing c = crossing(q);
+        if (!c.certain) c = exact::crossing(q);
+        if (c.ahead == 0 && (c.turn != 0 || (p.x >= low.x && p.x <= high.x && on_triangle(q))))
+          found_[i].on_surface = true;
+        else if (c.turn != 0 && (c.ahead < 0) == backwards_)
+          found_[i].number += backwards_ ? -c.turn : c.turn;
+      }
+    }
+  }
+
+  const Tree& tree_;
+  const MotionBounds& snapshot_;
+  const Features& features_;
+  std::span<const V> points_;
+  std::span<Winding> found_;
+  float at_[3][points_at_once] = {};  // in coordinates of boxes
+  Box around_;
+  bool backwards_;
+};
+
 }  // namespace
+
+void winding_numbers(const Tree& tree, const MotionBounds& snapshot, const Features& features, std::uint32_t mesh,
+                     std::span<const Vec3<double>> points, std::span<Winding> found) {
+  if (!points.empty() && !tree.nodes.empty()) return Rays(tree, snapshot, features, points, found).search(mesh);
+  std::ranges::fill(found, Winding{0, false});
+}
 
 Winding winding_number(const Tree& tree, const MotionBounds& snapshot, const Features& features, std::uint32_t mesh,
                        const Vec3<double>& point) {
-  float at[3];
-  for (int k = 0; k < 3; ++k) {
-    const double x = exact::coordinate(point, k);
-    at[k] = snapshot.squeezed.empty() ? snapshot.map(x, k) : snapshot.squeezed[static_cast<std::size_t>(k)](x);
-  }
-  const auto meets_ray = [&](const Box& box) {
-    return (at[1] >= box.low[1]) & (at[1] <= box.high[1]) & (at[2] >= box.low[2]) & (at[2] <= box.high[2]) &
-           (at[0] <= box.high[0]);
-  };
-  Winding winding{0, false};
-  V q[4] = {point};
-  const auto test = [&](std::uint32_t face) {
-    for (int i = 0; i < 3; ++i) q[1 + i] = position(snapshot, features.faces[face][static_cast<std::size_t>(i)]);
-    const auto y = std::minmax({q[1].y, q[2].y, q[3].y}), z = std::minmax({q[1].z, q[2].z, q[3].z});
-    const auto x = std::minmax({q[1].x, q[2].x, q[3].x});
-    if (point.y < y.first || point.y > y.second || point.z < z.first || point.z > z.second || point.x > x.second)
-      return true;
-    Crossing c = crossing(q);
-    if (!c.certain) c = exact::crossing(q);
-    winding.on_surface = c.ahead == 0 && (c.turn != 0 || (point.x >= x.first && on_triangle(q)));
-    if (c.turn != 0 && c.ahead > 0) winding.number += c.turn;
-    return !winding.on_surface;
-  };
-  if (tree.nodes.empty()) return winding;
-  std::vector<std::uint32_t> stack{0};
-  while (!stack.empty()) {
-    const Node& node = tree.nodes[stack.back()];
-    stack.pop_back();
-    if ((node.mesh != mixed_meshes && node.mesh != mesh) || !meets_ray(node.box.t0)) continue;
-    if (node.children) {
-      stack.push_back(node.children + 1), stack.push_back(node.children);
-      continue;
-    }
-    const LeafRange& leaf = tree.leaves[node.leaf];
-    for (std::uint32_t slot = leaf.first_face; slot < leaf.end_face; ++slot)
-      if (!test(tree.face_of_slot[slot])) return {0, true};
-  }
-  return winding;
+  Winding found;
+  winding_numbers(tree, snapshot, features, mesh, {&point, 1}, {&found, 1});
+  return found;
 }
 
 }  // namespace hpccd

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "base/vec3.h"
 #include "bvh/motion_bounds.h"
@@ -17,6 +18,14 @@ struct Winding {
   bool on_surface;
 };
 
+// Rays of as many points descend the tree together. The points should be near each other: 100,000 points near a mesh of
+// 100,000 triangles take a third of the time that they take one by one.
+inline constexpr std::size_t points_at_once = 16;
+
+// Of at most points_at_once points and a closed mesh in the snapshot to which the tree is fitted. Coordinates up to
+// largest_in_snapshot.
+void winding_numbers(const Tree& tree, const MotionBounds& snapshot, const Features& features, std::uint32_t mesh,
+                     std::span<const Vec3<double>> points, std::span<Winding> found);
 // Of a point and a closed mesh in the snapshot to which the tree is fitted. Coordinates up to largest_in_snapshot.
 Winding winding_number(const Tree& tree, const MotionBounds& snapshot, const Features& features, std::uint32_t mesh,
                        const Vec3<double>& point);
