@@ -12,6 +12,7 @@ from . import (
 from ._core import Cancelled, DeviceArray, InvalidArgument, __version__
 from ._installations import warn_of_several as _warn_of_several
 from .contacts import Contacts
+from .contours import Contour, EnclosedRegion
 from .detector import Detector
 from .device_results import DeviceContacts, DeviceIntersections, DeviceProximity
 from .devices import backends, gpu_status
@@ -28,11 +29,13 @@ __all__ = [
     "Cancelled",
     "CollisionFreeMotion",
     "Contacts",
+    "Contour",
     "Detector",
     "DeviceArray",
     "DeviceContacts",
     "DeviceIntersections",
     "DeviceProximity",
+    "EnclosedRegion",
     "Gap",
     "Intersections",
     "InvalidArgument",

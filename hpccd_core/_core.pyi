@@ -120,6 +120,11 @@ class _Proximity(TypedDict):
 class _Intersections(TypedDict):
     ef: NDArray[np.uint32]
     hash: int
+    points: NDArray[np.float64]
+    edge_parameters: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    incidences: NDArray[np.uint8]
+    directions: NDArray[np.float64]
     slices: NotRequired[_Slices]  # of several worlds
 
 _Gap = tuple[
@@ -206,6 +211,7 @@ class Options:
     normals: bool
     closest: bool
     weights: bool
+    directions: bool
     minimum_separation: float
     method: Method
     restructure: bool
@@ -229,6 +235,7 @@ class Detector:
     def proximity(self, vertices: _Given, distance: float) -> _Proximity | _OnDevice: ...
     def intersections(self, vertices: _Given) -> _Intersections | _OnDevice: ...
     def distances(self, vertices: _Given) -> list[_Gap]: ...
+    def faces(self) -> NDArray[np.uint32]: ...
     def set_separation(self, mesh_a: int, mesh_b: int, separation: float) -> None: ...
     def set_separations(self, of_pairs: NDArray[np.float64]) -> None: ...
     def cancel(self) -> None: ...
@@ -292,6 +299,18 @@ def test_edge_edge(
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]: ...
 def contacts_of_step(answers: Sequence[tuple[object, float, float]]) -> _Contacts: ...
 def hash_of_contacts(contacts: object) -> int: ...
+def contours(
+    ef: NDArray[np.uint32],
+    incidences: NDArray[np.uint8],
+    faces: NDArray[np.uint32],
+    first_vertex: NDArray[np.int64],
+) -> list[tuple[NDArray[np.uint32], bool, int, int]]: ...
+def enclosed_regions(
+    ef: NDArray[np.uint32],
+    incidences: NDArray[np.uint8],
+    faces: NDArray[np.uint32],
+    first_vertex: NDArray[np.int64],
+) -> list[tuple[NDArray[np.uint32], NDArray[np.uint32]]]: ...
 
 class StandardArithmetic:  # a context manager: the standard floating-point mode in this thread
     def __init__(self) -> None: ...

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _core
-from .options import FEATURES, OUTPUTS
+from .options import ALL_OUTPUTS, FEATURES
 
 if TYPE_CHECKING:
     from .mesh_layout import MeshLayout
@@ -277,7 +277,7 @@ def _integers_of_any_size(value: object, array: NDArray[Any]) -> NDArray[Any]:
 
 def output_names(value: Iterable[str]) -> tuple[str, ...]:
     """A tuple of output names from one name or several."""
-    return _names("outputs", value, OUTPUTS)
+    return _names("outputs", value, ALL_OUTPUTS)
 
 
 def feature_names(value: Iterable[str]) -> tuple[str, ...]:

@@ -21,9 +21,9 @@ from .devices import backends, gpu_status
 from .motion_queries import MotionQueries
 from .options import (
     ACCURACIES,
+    ALL_OUTPUTS,
     BACKENDS,
     METHODS,
-    OUTPUTS,
     REPORTS,
     RESULTS,
     SIMD,
@@ -85,9 +85,9 @@ class Detector(
         Number of CPU threads; 0 for all cores.
     report : {"all", "first", "any"}
         All contacts, those at the earliest time of impact, or any one, not necessarily the earliest.
-    outputs : iterable of {"points", "normals", "closest", "weights"}
-        What to compute for each contact beside its features and its time of impact; "weights" gives `vertices`,
-        `weights` and `approach`.
+    outputs : iterable of {"points", "normals", "closest", "weights", "directions"}
+        What to compute beside features and times of impact: "weights" gives `vertices`, `weights` and `approach`, and
+        "points" the curves of :class:`Intersections`, which "directions" shorten.
     minimum_separation : float
         Report features that come within this distance, in the unit of the coordinates; 0 reports only contact. Keep
         it below the distance of neighbours within each mesh (distances() at rest), or these are always reported.
@@ -257,6 +257,7 @@ class Detector(
         options.normals = "normals" in self._outputs
         options.closest = "closest" in self._outputs
         options.weights = "weights" in self._outputs
+        options.directions = "directions" in self._outputs
         options.minimum_separation = minimum_separation
         options.method = getattr(_core.Method, method)
         options.restructure = arguments.flag("restructure", restructure)
@@ -442,7 +443,7 @@ _OPTIONS = tuple(inspect.signature(Detector.__init__).parameters)[2:]
 _OTHER_NAMES = {
     "tier": "write accuracy=",
     "device": "write backend='cpu' or 'gpu'; results='device' leaves results on the GPU",
-    **{name: f"write outputs=({name!r},)" for name in OUTPUTS},
+    **{name: f"write outputs=({name!r},)" for name in ALL_OUTPUTS},
     **{name: f"write outputs=({output!r},)" for name, output in arguments.ALIASES.items()},
     **dict.fromkeys(("gradients", "toc_gradients"), "write outputs=('normals', 'weights')"),
     **dict.fromkeys(

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from ._core import DeviceArray, integers_on_device
 from .contacts import Contacts
 from .mesh_layout import MeshLayout
 from .proximity import Intersections, Proximity
-from .results import output, with_outputs
+from .results import INTERSECTION_ARRAYS, OutputNotComputed, output, with_outputs
 from .worlds import Slices
 
 
@@ -216,6 +216,11 @@ class DeviceIntersections(_OnDevice):
     """Intersections in a GPU's memory: names, shapes, dtypes and order as in :class:`Intersections`."""
 
     ef: DeviceArray
+
+    def __getattr__(self, name: str) -> NoReturn:
+        if name in INTERSECTION_ARRAYS or name in ("contours", "regions"):
+            raise OutputNotComputed(f"{name}: not computed in a GPU's memory; make the detector with results='host'")
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     @property
     def ef_offsets(self) -> DeviceArray:

@@ -4,13 +4,17 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
+from collections.abc import Iterator
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _core
+from .contours import Contour, EnclosedRegion
 from .mesh_layout import Indices, MeshLayout
-from .results import WithSides, output
+from .results import INTERSECTION_ARRAYS, WithSides, output
 from .worlds import ComparedByRows, OfWorlds, PairsOfWorlds, Slices
 
 Kind = Literal["vertex-face", "edge-edge", "edge-face", ""]
@@ -121,12 +125,157 @@ class Intersections(WithSides, OfWorlds):
         Vertices a0 < a1 of the edge, and the face; scene-wide indices, sorted lexicographically.
     hash : int
         64-bit; the same for the same pairs on any backend and with any number of threads.
+    outputs : dict of str to ndarray
+        The outputs that the detector was asked for; `points`, `edge_parameters`, `weights`, `incidences` and
+        `directions` read it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import hpccd_core as hc
+    >>> vertices, faces = hc.shapes.icosphere(2)
+    >>> scene = hc.Scene()
+    >>> _ = scene.add_mesh("left", faces), scene.add_mesh("right", faces)
+    >>> both = np.concatenate([vertices, vertices + [1.0, 0.1, 0.2]])
+    >>> hits = hc.Detector(scene, outputs=("points",)).intersections(both)
+    >>> hits
+    Intersections(38 edge-face)
+    >>> contour, = hits.contours()
+    >>> contour
+    Contour(left and right, 38 points, closed)
+    >>> region, = hits.regions()
+    >>> len(region.vertices_a), len(region.vertices_b)
+    (10, 10)
     """
 
     ef: Indices
     hash: int
+    outputs: dict[str, NDArray[Any]] = dataclasses.field(default_factory=dict)
     slices: Slices | None = dataclasses.field(default=None, repr=False)
     layout: MeshLayout | None = dataclasses.field(default=None, repr=False, compare=False)
+    #: (F, 3): of the scene, where contours can be asked for.
+    faces: Indices | None = dataclasses.field(default=None, repr=False, compare=False)
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """(K, 3) float64: where the edge meets the face.
+
+        Within 1e-12 of the length of the edge, for slivers too. Where they share a segment, because the edge lies in
+        the plane of the face, it is the end of that nearer to the edge's first vertex. Raises `OutputNotComputed`
+        unless the detector was made with outputs=("points",).
+        """
+        return self._output("points")
+
+    @property
+    def edge_parameters(self) -> NDArray[np.float64]:
+        """(K,) float64: the position of the point on the edge, from 0 at its first vertex to 1 at its second.
+
+        Raises `OutputNotComputed` unless the detector was made with outputs=("points",).
+        """
+        return self._output("edge_parameters")
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """(K, 3) float64: the barycentric coordinates of the point on the face, in [0, 1].
+
+        Raises `OutputNotComputed` unless the detector was made with outputs=("points",).
+        """
+        return self._output("weights")
+
+    @property
+    def incidences(self) -> NDArray[np.uint8]:
+        """(K,) uint8: degenerate cases as bits, decided exactly.
+
+        1, 2: they meet at the first, second vertex of the edge. 4, 8, 16: the weight of the first, second, third vertex
+        of the face is 0. 32: the edge lies in the plane of the face, or the face has no area. Raises
+        `OutputNotComputed` unless the detector was made with outputs=("points",).
+        """
+        return self._output("incidences")
+
+    @property
+    def directions(self) -> NDArray[np.float64]:
+        """(K, 3) float64: how the edge should move relative to the face to shorten the intersection curves.
+
+        The vector G = sum over the faces of the edge of R - 2 (E . R) / (E . N) N, with the edge's direction E, the
+        normal N of the intersected face, and the direction R, away from the edge, in which the curve runs through the
+        edge's face; all of unit length (Volino and Magnenat-Thalmann, "Resolving surface collisions through
+        intersection contour minimization", 2006). If the material point of the edge moves by D / 2 and that of the face
+        by -D / 2, the curves become longer by -G . D / 2 to first order: D = G is the steepest descent. G is not of
+        unit length: it grows without bound as the edge becomes parallel to the face, so limit the displacement. Zero
+        where it is parallel, and for edges without faces. Ends at a vertex of both sides do not contribute. Raises
+        `OutputNotComputed` unless the detector was made with outputs=("directions",).
+        """
+        return self._output("directions")
+
+    def contours(self) -> list[Contour]:
+        """The intersection curves: points linked through pairs of intersecting triangles.
+
+        Returns
+        -------
+        list of Contour
+            Each row is in exactly one contour. A closed contour begins with its smallest row and goes on to the smaller
+            one of both neighbours; an open one begins at the end with the smaller row. They are sorted by smallest row,
+            world by world.
+
+        Raises
+        ------
+        OutputNotComputed
+            Unless the detector was made with outputs=("points",).
+
+        Notes
+        -----
+        Degenerate cases are decided exactly. Where an edge passes through an edge or a vertex, the rows of the same
+        point follow each other. Overlaps in a plane have no curve inside; the points there are contours of a single
+        point, as are points where the meshes only touch. Where more than two segments meet, as at an edge of three
+        faces, one curve contains the point, and the others end before it.
+        """
+        names = self._required_layout().mesh_names
+        found = []
+        for first, *arrays in self._of_each_world():
+            for rows, closed, a, b in _core.contours(*arrays):
+                rows += np.uint32(first)
+                found.append(Contour(rows, self.points[rows], closed, names[a], names[b]))
+        return found
+
+    def regions(self) -> list[EnclosedRegion]:
+        """The vertices enclosed by each contour, on both sides: global intersection analysis.
+
+        Returns
+        -------
+        list of EnclosedRegion
+            In the order of :meth:`contours`. Of the two parts into which a closed contour divides a mesh, the one with
+            fewer vertices; empty where it passes between the vertices, or does not divide the mesh (as a ring around a
+            torus), and for open contours. An open contour of one mesh that ends in two vertices of it is a loop on the
+            mesh: it has the same region on both sides. Vertices on the contour are not enclosed.
+
+        Raises
+        ------
+        OutputNotComputed
+            Unless the detector was made with outputs=("points",).
+
+        Notes
+        -----
+        By flood fill from the edges that the contour crosses (Baraff, Witkin and Kass, "Untangling cloth", 2003). The
+        cost is that of the enclosed vertices, and of one pass over all faces.
+        """
+        found = [_core.enclosed_regions(*arrays) for _, *arrays in self._of_each_world()]
+        return [EnclosedRegion(*vertices) for of_world in found for vertices in of_world]
+
+    def _required_layout(self) -> MeshLayout:
+        self._output("points")
+        if self.layout is None or self.faces is None:
+            raise ValueError("Intersections: has no faces; use a result of a detector with results='host'")
+        return self.layout
+
+    def _of_each_world(self) -> Iterator[tuple[Any, ...]]:
+        """The first row of each world, and the arguments of the core."""
+        layout, begin = self._required_layout(), self.ef_offsets.tolist()
+        for first, last in itertools.pairwise(begin):
+            rows = slice(first, last)
+            yield first, self.ef[rows], self.incidences[rows], self.faces, layout.vertex_offsets
+
+    def _output(self, name: str) -> NDArray[Any]:
+        return output(self.outputs, name, arrays=INTERSECTION_ARRAYS)
 
     @property
     def ef_offsets(self) -> NDArray[np.int64]:
@@ -139,7 +288,13 @@ class Intersections(WithSides, OfWorlds):
         if self.slices is None:
             return self
         begin, end = self.slices.ef[k : k + 2]
-        return Intersections(ef=self.ef[begin:end], hash=int(self.slices.hashes[k]), layout=self.layout)
+        return Intersections(
+            ef=self.ef[begin:end],
+            hash=int(self.slices.hashes[k]),
+            outputs={name: rows[begin:end] for name, rows in self.outputs.items()},
+            layout=self.layout,
+            faces=self.faces,
+        )
 
     def _pairs(self) -> tuple[Indices, Indices, Indices]:
         none = self.ef[:0]

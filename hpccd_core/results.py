@@ -33,6 +33,15 @@ OUTPUT_ARRAYS = {
     "approach": OutputArray("weights", ()),
 }
 
+#: Of intersections.
+INTERSECTION_ARRAYS = {
+    "points": OutputArray("points", (3,)),
+    "edge_parameters": OutputArray("points", ()),
+    "weights": OutputArray("points", (3,)),
+    "incidences": OutputArray("points", (), "uint8"),
+    "directions": OutputArray("directions", (3,)),
+}
+
 
 class OutputNotComputed(ValueError, AttributeError):
     """An output of a result was read that its detector was not asked for.
@@ -50,12 +59,12 @@ class OutputNotComputed(ValueError, AttributeError):
     """
 
 
-def output(outputs: dict[str, Array], name: str, *others: str) -> Array:
+def output(outputs: dict[str, Array], name: str, *others: str, arrays: dict[str, OutputArray] = OUTPUT_ARRAYS) -> Array:
     """The output of this name. Raises OutputNotComputed where it was not asked for; names of others needed with it."""
     try:
         return outputs[name]
     except KeyError:
-        asked = tuple(dict.fromkeys(OUTPUT_ARRAYS[array].asked for array in (*outputs, name, *others)))
+        asked = tuple(dict.fromkeys(arrays[array].asked for array in (*outputs, name, *others)))
         raise OutputNotComputed(f"{name}: not computed; make the detector with outputs={asked!r}") from None
 
 
@@ -111,11 +120,13 @@ class WithSides:
         return self._sides.local_b
 
 
-def with_outputs(found: dict[str, Any], outputs: tuple[str, ...]) -> dict[str, Any]:
+def with_outputs(
+    found: dict[str, Any], outputs: tuple[str, ...], arrays: dict[str, OutputArray] = OUTPUT_ARRAYS
+) -> dict[str, Any]:
     """The result of the core, with the requested outputs in a dict of their own."""
     # A loop, not comprehensions, which cost 1.3 us of a call of 15.
     kept = {}
-    for name, (asked, _, _) in OUTPUT_ARRAYS.items():
+    for name, (asked, _, _) in arrays.items():
         array = found.pop(name, None)
         if array is not None and asked in outputs:
             kept[name] = array

@@ -3,15 +3,16 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any, Generic, NoReturn, cast
 
 from . import _core, arguments, device_arrays, device_results
 from .array_types import Positions, Stream
-from .mesh_layout import MeshLayout
+from .mesh_layout import Indices, MeshLayout
 from .options import Results
 from .proximity import Gap, Intersections, Proximity
 from .result_types import DistancesResult, IntersectionsResult, ProximityResult
-from .results import result_of, with_outputs
+from .results import INTERSECTION_ARRAYS, result_of, with_outputs
 
 _ONE_FRAME = "the positions of one frame; for a motion call detect(vertices_t0, vertices_t1)"
 
@@ -68,7 +69,7 @@ class SnapshotQueries(Generic[ProximityResult, IntersectionsResult, DistancesRes
         Returns
         -------
         Intersections or DeviceIntersections
-            Decided as by rational arithmetic, at every accuracy.
+            Decided as by rational arithmetic, at every accuracy. With outputs=("points",) it has intersection curves.
         """
         if unnamed:
             arguments.reject_unnamed("intersections", _ONE_FRAME)
@@ -76,6 +77,9 @@ class SnapshotQueries(Generic[ProximityResult, IntersectionsResult, DistancesRes
         on_device = self.results == "device"
         if on_device:
             return cast(IntersectionsResult, device_results.intersections_of(found, self._layout))
+        found = with_outputs(found, self._outputs, INTERSECTION_ARRAYS)
+        if "points" in self._outputs:
+            found["faces"] = self._faces
         return cast(IntersectionsResult, result_of(Intersections, found, self._layout))
 
     @arguments.hide_unnamed
@@ -109,6 +113,12 @@ class SnapshotQueries(Generic[ProximityResult, IntersectionsResult, DistancesRes
             return cast(DistancesResult, gaps)
         n = len(gaps) // self.worlds
         return cast(DistancesResult, [gaps[k * n : (k + 1) * n] for k in range(self.worlds)])
+
+    @functools.cached_property
+    def _faces(self) -> Indices:
+        faces: Indices = self._core.faces()
+        faces.flags.writeable = False  # all results share it
+        return faces
 
     def _ask(self, query: str, vertices: object, stream: object, *more: float) -> Any:
         made_on = device_arrays.stream_number(stream)

@@ -4,7 +4,8 @@ set(hpccd_sources
   src/base/forks.cpp src/base/parallel.cpp src/base/simd.cpp
   src/base/standard_arithmetic.cpp src/base/thread_affinity.cpp
   src/rigid/c_library.cpp src/rigid/joint_bounds.cpp src/rigid/joint_chain.cpp src/rigid/placed_vertices.cpp
-  src/scene/edges.cpp src/scene/features.cpp src/scene/pair_rules.cpp src/scene/scene.cpp src/scene/separation_table.cpp
+  src/scene/edges.cpp src/scene/face_adjacency.cpp src/scene/features.cpp src/scene/pair_rules.cpp
+  src/scene/scene.cpp src/scene/separation_table.cpp
   src/scene/static_meshes.cpp src/scene/tested_pairs.cpp
   src/bvh/build.cpp src/bvh/motion_bounds.cpp src/bvh/refit.cpp src/bvh/split.cpp src/bvh/squeezed_axis.cpp
   src/elementary/batch.cpp src/elementary/distance/distance_batch.cpp src/elementary/exact/contact.cpp
@@ -19,7 +20,8 @@ set(hpccd_sources
   src/traverse/leaf_edge_faces.cpp src/traverse/leaf_hulls.cpp src/traverse/leaf_pairs.cpp src/traverse/mesh_pairs.cpp
   src/traverse/less_excess.cpp src/traverse/near_corners.cpp src/traverse/nearest_pairs.cpp
   src/traverse/pair_pool.cpp src/traverse/snapshot_search.cpp src/traverse/worker.cpp
-  src/contacts/canonical.cpp src/contacts/gaps.cpp src/contacts/intersections.cpp
+  src/contacts/canonical.cpp src/contacts/contours.cpp src/contacts/gaps.cpp
+  src/contacts/intersection_place.cpp src/contacts/intersections.cpp
   src/contacts/order.cpp src/contacts/parts.cpp src/contacts/places.cpp src/contacts/worlds.cpp
   src/solid/closed.cpp src/solid/winding.cpp
   src/paper/build.cpp src/paper/front.cpp src/paper/front_based.cpp src/paper/hierarchy.cpp

@@ -8,6 +8,7 @@
 #include "base/standard_arithmetic.h"
 #include "bindings_device.h"
 #include "bindings_rigid.h"
+#include "contacts/contours.h"
 #include "contacts/parts.h"
 #include "gpu/device.h"
 #include "gpu/memory_on_device.h"
@@ -100,8 +101,26 @@ py::dict to_dict(Intersections&& c) {
   py::dict d;
   d["ef"] = hand_over<std::uint32_t>(std::move(c.ef), 3);
   d["hash"] = c.hash;
+  d["points"] = hand_over<double>(std::move(c.points), 3);
+  d["edge_parameters"] = hand_over<double>(std::move(c.edge_parameters));
+  d["weights"] = hand_over<double>(std::move(c.weights), 3);
+  d["incidences"] = hand_over<std::uint8_t>(std::move(c.incidences));
+  d["directions"] = hand_over<double>(std::move(c.directions), 3);
   add_slices(d, std::move(c.slices));
   return d;
+}
+
+// Rows of one world, from numpy arrays that the caller keeps alive.
+IntersectionRows rows_of(const Array<std::uint32_t>& ef, const Array<std::uint8_t>& incidences,
+                         const Array<std::uint32_t>& faces, const Array<std::int64_t>& first_vertex) {
+  const auto triples = [](const Array<std::uint32_t>& a) {
+    return std::span(reinterpret_cast<const std::array<std::uint32_t, 3>*>(a.data()),
+                     static_cast<std::size_t>(a.size()) / 3);
+  };
+  return {triples(ef),
+          {incidences.data(), static_cast<std::size_t>(incidences.size())},
+          triples(faces),
+          {first_vertex.data(), static_cast<std::size_t>(first_vertex.size())}};
 }
 
 py::array_t<double> widened(const Array<float>& from) {
@@ -335,6 +354,7 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
       .def_readwrite("normals", &Options::normals)
       .def_readwrite("closest", &Options::closest)
       .def_readwrite("weights", &Options::weights)
+      .def_readwrite("directions", &Options::directions)
       .def_readwrite("minimum_separation", &Options::minimum_separation)
       .def_readwrite("method", &Options::method)
       .def_readwrite("restructure", &Options::restructure)
@@ -420,6 +440,13 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
             unlocked_if_busy(d, [&] { d.set_separations(numbers); });
           },
           "of_pairs"_a)
+      // Every face of the scene, with scene-wide vertices.
+      .def("faces",
+           [](const Detector& d) {
+             const auto& faces = d.scene().faces();
+             return Array<std::uint32_t>(std::vector<py::ssize_t>{static_cast<py::ssize_t>(faces.size()), 3},
+                                         reinterpret_cast<const std::uint32_t*>(faces.data()));
+           })
       .def("cancel", &Detector::cancel)
       .def("profile", [](const Detector& d) { return unlocked_if_busy(d, [&] { return d.profile(); }); })
       .def("stats", [](const Detector& d) { return unlocked_if_busy(d, [&] { return d.stats(); }); })
@@ -464,6 +491,31 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
         return to_dict(unlocked([&] { return contacts_of_step(of_parts); }));
       },
       "answers"_a);
+  // (rows, closed, mesh_a, mesh_b) of each contour.
+  m.def(
+      "contours",
+      [](const Array<std::uint32_t>& ef, const Array<std::uint8_t>& incidences, const Array<std::uint32_t>& faces,
+         const Array<std::int64_t>& first_vertex) {
+        const IntersectionRows rows = rows_of(ef, incidences, faces, first_vertex);
+        py::list l;
+        for (Contour& c : unlocked([&] { return contours(rows); }))
+          l.append(py::make_tuple(hand_over<std::uint32_t>(std::move(c.rows)), c.closed, c.mesh_a, c.mesh_b));
+        return l;
+      },
+      "ef"_a, "incidences"_a, "faces"_a, "first_vertex"_a);
+  // (vertices_a, vertices_b) of each contour.
+  m.def(
+      "enclosed_regions",
+      [](const Array<std::uint32_t>& ef, const Array<std::uint8_t>& incidences, const Array<std::uint32_t>& faces,
+         const Array<std::int64_t>& first_vertex) {
+        const IntersectionRows rows = rows_of(ef, incidences, faces, first_vertex);
+        py::list l;
+        for (EnclosedRegion& r : unlocked([&] { return enclosed_regions(rows); }))
+          l.append(py::make_tuple(hand_over<std::uint32_t>(std::move(r.vertices_a)),
+                                  hand_over<std::uint32_t>(std::move(r.vertices_b))));
+        return l;
+      },
+      "ef"_a, "incidences"_a, "faces"_a, "first_vertex"_a);
   m.def(
       "hash_of_contacts",
       [](const py::object& contacts) {

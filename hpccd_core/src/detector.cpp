@@ -14,6 +14,7 @@
 #include "base/one_call.h"
 #include "base/standard_arithmetic.h"
 #include "checked.h"
+#include "contacts/intersections.h"
 #include "contacts/outputs.h"
 #include "gpu/results_to_device.h"
 #include "prepared_impl.h"
@@ -57,6 +58,7 @@ struct Detector::Impl {
   std::unique_ptr<Engine> engine;  // empty after a call that ended unexpectedly, for example without memory
   const bool takes_device_arrays;
   Tuner tuner;
+  std::optional<FaceAdjacency> adjacency;  // made when directions are first computed
   // Results of the last call. Its other counts are collected when they are requested.
   std::optional<Counts> found;
   Backend asked = Backend::cpu;  // which may have left the rest to the CPU
@@ -213,6 +215,14 @@ struct Detector::Impl {
     });
   }
 
+  void add_places(Intersections& hits, Positions vertices) {
+    const Options& o = options();
+    if (!o.points && !o.directions) return;
+    const Features& features = common.features;
+    if (o.directions && !adjacency) adjacency.emplace(features.faces, features.n_vertices);
+    hpccd::add_places(hits, features, backends().on_host(vertices, 0), adjacency ? &*adjacency : nullptr, common.pool);
+  }
+
   void note(Backend picked, Backend computed_by, std::uint64_t n_vf, std::uint64_t n_ee) {
     found = {{"vf_contacts", n_vf}, {"ee_contacts", n_ee}};
     profiler().end();
@@ -309,9 +319,11 @@ Proximity Detector::proximity(Positions vertices, double distance) {
 Intersections Detector::intersections(Positions vertices) {
   const StandardArithmetic arithmetic;
   impl_->require_results_on_host("intersections_on_device");
-  return impl_->snapshot(vertices, [](DetectionBackend& backend, Positions v, Counts& found) {
+  return impl_->snapshot(vertices, [&](DetectionBackend& backend, Positions v, Counts& found) {
     auto hits = backend.intersections(v);
-    if (hits) found = {{"ef_intersections", hits->ef.size()}};
+    if (!hits) return hits;
+    found = {{"ef_intersections", hits->ef.size()}};
+    impl_->add_places(*hits, v);
     return hits;
   });
 }
@@ -422,6 +434,7 @@ std::map<std::string, std::uint64_t> Detector::stats() const {
 }
 
 bool Detector::busy() const { return impl_->one_call.held(); }
+const Scene& Detector::scene() const { return *impl_->common.scene; }
 const Options& Detector::options() const { return impl_->options(); }
 Backend Detector::last_backend() const { return impl_->last_backend; }
 

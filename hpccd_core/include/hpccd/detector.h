@@ -26,9 +26,9 @@ inline namespace v0_1 {
 /// A detector keeps its memory from call to call, so use one detector for all steps of a scene.
 ///
 /// Threads: a detector runs one call at a time; concurrent calls wait for each other. For parallel calls use one
-/// detector per thread; they may share a scene. Only cancel(), busy(), options() and last_backend() never wait. A child
-/// process created by fork() has none of a detector's threads: queries throw std::runtime_error there, unless the
-/// detector has one thread and was in no call. It may be destroyed.
+/// detector per thread; they may share a scene. Only cancel(), busy(), scene(), options() and last_backend() never
+/// wait. A child process created by fork() has none of a detector's threads: queries throw std::runtime_error there,
+/// unless the detector has one thread and was in no call. It may be destroyed.
 ///
 /// Errors: every query throws InvalidArgument if the number, type or values of positions are invalid (see Positions),
 /// and Cancelled after cancel(). The detector remains usable after InvalidArgument and after std::bad_alloc; after the
@@ -100,6 +100,7 @@ class HPCCD_API Detector {
   std::string last_gpu_error() const;                  ///< why the CPU computed a step for the GPU, or ""
   // These never wait.
   bool busy() const;               ///< whether a call of another thread is running
+  const Scene& scene() const;      ///< the scene that was given
   const Options& options() const;  ///< with the threads and instruction set in use
   Backend last_backend() const;    ///< backend of the last step
 

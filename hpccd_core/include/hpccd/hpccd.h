@@ -12,6 +12,7 @@
 /// not link or load.
 #pragma once
 
+#include "hpccd/contours.h"
 #include "hpccd/detector.h"
 #include "hpccd/elementary.h"
 #include "hpccd/errors.h"

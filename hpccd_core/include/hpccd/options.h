@@ -39,10 +39,11 @@ struct Options {
   Simd simd = Simd::automatic;           ///< instruction set; automatic: the fastest one that the machine supports
   int threads = 0;                       ///< number of threads, at most 1024; 0: one per core that the process may use
   // Outputs of each contact besides its features and time.
-  bool points = false;   ///< where the features meet
-  bool normals = false;  ///< unit normals
-  bool closest = false;  ///< the nearest points of both sides
-  bool weights = false;  ///< vertices, weights and approach: what a solver needs beside normals
+  bool points = false;      ///< where the features meet; of intersections with edge_parameters and weights
+  bool normals = false;     ///< unit normals
+  bool closest = false;     ///< the nearest points of both sides
+  bool weights = false;     ///< vertices, weights and approach: what a solver needs beside normals
+  bool directions = false;  ///< of intersections only: how edge and face should move apart
   /// Pairs that come within this Euclidean distance of each other are contacts. In units of the coordinates, finite,
   /// >= 0. 0: pairs that touch.
   double minimum_separation = 0;

@@ -90,6 +90,17 @@ struct Intersections {
   std::vector<std::array<std::uint32_t, 3>> ef;  ///< edge vertices a0 < a1, face
   std::uint64_t hash = 0;                        ///< hash of the pairs, as in Contacts
   WorldSlices slices;                            ///< for several worlds, as in Contacts
+  /// Where the edge meets the face; as the next three, empty unless Options::points is set. Where they share a segment,
+  /// its end nearer to the edge's first vertex.
+  std::vector<std::array<double, 3>> points;
+  std::vector<double> edge_parameters;         ///< position on the edge, from 0 at its first vertex to 1
+  std::vector<std::array<double, 3>> weights;  ///< barycentric coordinates on the face, in [0, 1]
+  /// What holds exactly, as bits. 1, 2: they meet at the edge's first, second vertex. 4, 8, 16: the weight of the
+  /// face's first, second, third vertex is 0. 32: the edge lies in the plane of the face, or the face has no area.
+  std::vector<std::uint8_t> incidences;
+  /// The vector G of Volino and Magnenat-Thalmann 2006: moving the edge by D / 2 and the face by -D / 2 changes the
+  /// length of the intersection curves by -G . D / 2. Empty unless Options::directions is set.
+  std::vector<std::array<double, 3>> directions;
 };
 
 /// The kind of the closest pair of features. none: no pair exists. edge_face: the meshes intersect.
