@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 import oracle
 import pytest
+from fuzz.solid_scenes import TRANSLATION_SCENES, lattice, shaped
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 CUBE = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4)]
@@ -134,10 +135,10 @@ def test_depths_of_boxes_and_their_images():
 
 def test_depth_is_the_least_separating_translation():
     rng = np.random.default_rng(9)
-    pairs = [tuple((rng.integers(-8, 9, (4, 3)).astype(float), TETRAHEDRON) for _ in range(2)) for _ in range(200)]
+    pairs = [tuple((rng.integers(-8, 9, (4, 3)).astype(float), TETRAHEDRON) for _ in range(2)) for _ in range(60)]
     depths = oracle.convex_depths(pairs)
     touching = [i for i, pair in enumerate(pairs) if depths[i] > 0]
-    assert 20 < len(touching) < 190
+    assert 6 < len(touching) < 57
     for i in touching:
         (v, f), (w, g) = pairs[i]
         sides = [np.cross(x[h[:, 1]] - x[h[:, 0]], x[h[:, 2]] - x[h[:, 0]]) for x, h in ((v, f), (w, g))]
@@ -183,3 +184,28 @@ def test_point_of_an_edge_and_a_face_rounds_once():
     # x = third = -w0 + 2 w1, 0 = -w0 + 3 w2, w0 + w1 + w2 = 1
     w0 = Fraction(5, 11)
     assert weights[0].tolist() == [float(w0), float((w0 + Fraction(1, 3)) / 2), float(w0 / 3)]
+
+
+def is_free(a, b):
+    faces = [a[1], b[1]]
+    hits = oracle.intersections(np.concatenate([a[0], b[0]]), faces, n_vertices=[len(a[0]), len(b[0])],
+                                no_self_collision=[0, 1], threads=1)  # fmt: skip
+    return not len(hits) and not oracle.contained([a, b], threads=1).any()
+
+
+@pytest.mark.parametrize("kind", TRANSLATION_SCENES)
+def test_translations_are_the_least_free_ones(kind):
+    """No multiple of 1/8 below is free, and the next number above is, where no interval begins at once."""
+    rng = np.random.default_rng(13)
+    faces, rest = TRANSLATION_SCENES[kind]
+    free_above, away = [], 0
+    for _ in range(12):
+        a, b = ((rng.choice([lattice, shaped])(rng, points, 1)[0], f) for points, f in zip(rest, faces, strict=True))
+        d = np.roll((1.0, 0, 0), rng.integers(3))
+        least = oracle.separating_translations([(a, b)], d)[0]
+        assert not any(is_free((a[0] + s * d, a[1]), b) for s in np.arange(0, least, 0.125))
+        above = np.ceil(least * 2**12 + 0.5) / 2**12
+        free_above.append(is_free((a[0] + above * d, a[1]), b))
+        away += least > 0
+    assert away >= 2
+    assert np.mean(free_above) >= 0.8

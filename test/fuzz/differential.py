@@ -11,13 +11,29 @@ import numpy as np
 
 import hpccd_core as hc
 
-from . import questions
+from . import questions, solids
 from .motions import break_promises
-from .questions import CONTACT, DISTANCES, INTERSECTIONS, MOTION, PROXIMITY, SEPARATION, STEP, Batch, Results
+from .questions import (
+    CONTACT,
+    DEPTH,
+    DISTANCES,
+    INTERSECTIONS,
+    MOTION,
+    POINTS,
+    PROXIMITY,
+    SEPARATION,
+    SIGNED,
+    STEP,
+    TRANSLATION,
+    WINDING,
+    Batch,
+    Results,
+)
 from .steps import EARLY, contradict
 
 SIMD = ("scalar", "avx2", "avx512", "neon")
 QUESTIONS = (CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS, DISTANCES, STEP, MOTION)
+QUESTIONS += (POINTS,)
 
 # Guarantee of `exact`: error of the time; error of the distance, relative to the size of the query.
 TOLERANCE = 1e-12
@@ -51,6 +67,8 @@ class Disagreement:
             return self.uneven | self.missed | self.invented
         if self.question == STEP and accuracy in ("exact", "conservative"):
             return self.uneven | self.invented | ~((self.late <= 0) & (self.late >= -EARLY))
+        if self.question == DEPTH:  # an upper bound of the true one, in every tier
+            return self.uneven | self.missed | (self.late < -TOLERANCE)
         if accuracy == "exact":
             return self.uneven | self.missed | self.invented | (np.abs(self.late) > TOLERANCE)
         if accuracy != "conservative":
@@ -115,7 +133,7 @@ def compare(batch: Batch, accuracy: str, simd: Sequence[str], truth: Results) ->
     (hit, value), *others = (questions.results(batch, accuracy, s) for s in simd)
     # A distance of meshes is told whether or not they touch; it is infinite where they have no pair of features.
     # A step is told where nothing touches too, and a smallest factor.
-    always = batch.question in (DISTANCES, STEP, MOTION)
+    always = batch.question in (DISTANCES, STEP, MOTION, WINDING, SIGNED, TRANSLATION, DEPTH, POINTS)
     told = np.ones_like(hit) if always else hit
     largest = 1.0 if batch.question in (CONTACT, SEPARATION, STEP, MOTION) else np.inf
     if not ((value[told] >= 0) & (value[told] <= largest)).all():
@@ -135,7 +153,10 @@ def compare(batch: Batch, accuracy: str, simd: Sequence[str], truth: Results) ->
     if batch.question == MOTION:  # the value is a factor, to which others than the true step may be right
         late[:] = np.nan
         uneven |= break_promises(batch.kind, batch.queries, batch.distances, accuracy, simd, true_value)
-    if batch.question == DISTANCES:  # of several results for each scene the worst
+    if batch.question == DEPTH:
+        for s in simd:
+            uneven |= solids.break_promises(batch.kind, batch.queries, accuracy, s, true_value)
+    if late.ndim == 2:  # of several results for each scene the worst
         worst = np.abs(late).argmax(axis=1)[:, None]
         late = np.take_along_axis(late, worst, axis=1)[:, 0]
         missed, invented, uneven = (results.any(axis=1) for results in (missed, invented, uneven))

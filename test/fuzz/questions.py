@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Queries to the core and the oracle: contact, separation, proximity and intersections of single pairs; distances,
-collision-free steps and collision-free motions of small scenes."""
+collision-free steps, collision-free motions, winding numbers, separating translations and penetration of
+small scenes."""
 
 from __future__ import annotations
 
@@ -19,12 +20,41 @@ from .generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
 from .motions import FREE_MOTIONS, core_motions
 from .near_generators import NEAR_GENERATORS
 from .snapshots import EDGE_FACE, EDGE_FACE_POINTS, SNAPSHOTS
+from .solid_scenes import DEPTHS, TRANSLATIONS, WINDING_POINTS
+from .solids import (
+    core_depths,
+    core_points,
+    core_signed_distances,
+    core_translations,
+    core_windings,
+    true_depths,
+    true_points,
+    true_signed_distances,
+    true_translations,
+    true_windings,
+)
 from .steps import STEP_MOTIONS, core_steps, true_steps
 
 CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS = "contact", "separation", "proximity", "intersections"
 DISTANCES, STEP, MOTION = "distances", "step", "motion"
-OF_SCENES = {DISTANCES: TOPOLOGIES, STEP: STEP_MOTIONS, MOTION: FREE_MOTIONS}  # by question, their kinds
+WINDING, SIGNED = "winding", "signed-distance"
+TRANSLATION, DEPTH, POINTS = "translation", "depth", "points"
+# By question, their kinds.
+OF_SCENES = {
+    DISTANCES: TOPOLOGIES,
+    STEP: STEP_MOTIONS,
+    MOTION: FREE_MOTIONS,
+    TRANSLATION: TRANSLATIONS,
+    DEPTH: DEPTHS,
+}
 PAIRS_OF_A_SCENE = 10  # a batch has a tenth as many scenes as single pairs: each scene has dozens of pairs
+
+OF_SOLIDS = {
+    WINDING: (true_windings, core_windings),
+    SIGNED: (true_signed_distances, core_signed_distances),
+    TRANSLATION: (true_translations, core_translations),
+    DEPTH: (true_depths, core_depths),
+}
 
 # hit (Q,) bool; value (Q,) float64: time, distance, or 0. Distances (Q,N): several results for each scene.
 Results = tuple[np.ndarray, np.ndarray]
@@ -47,7 +77,9 @@ class Batch:
 def kinds_of(question: str) -> tuple[str, ...]:
     if question in OF_SCENES:
         return tuple(OF_SCENES[question])
-    return (EDGE_FACE,) if question == INTERSECTIONS else (VERTEX_FACE, EDGE_EDGE)
+    if question in (WINDING, SIGNED):
+        return tuple(WINDING_POINTS)
+    return (EDGE_FACE,) if question in (INTERSECTIONS, POINTS) else (VERTEX_FACE, EDGE_EDGE)
 
 
 def generators_of(question: str, kind: str) -> dict[str, Callable]:
@@ -59,6 +91,11 @@ def generators_of(question: str, kind: str) -> dict[str, Callable]:
         DISTANCES: dict.fromkeys(TOPOLOGIES, GAP_POINTS),
         STEP: STEP_MOTIONS,
         MOTION: FREE_MOTIONS,
+        WINDING: WINDING_POINTS,
+        SIGNED: WINDING_POINTS,
+        TRANSLATION: TRANSLATIONS,
+        DEPTH: DEPTHS,
+        POINTS: {EDGE_FACE: EDGE_FACE_POINTS},
     }[question][kind]
 
 
@@ -80,6 +117,10 @@ def truth(batch: Batch, threads: int = 0) -> Results:
         return true_gaps(batch.kind, batch.queries)
     if batch.question in (STEP, MOTION):
         return true_steps(batch.kind, batch.queries, batch.distances, threads)
+    if batch.question == POINTS:
+        return true_points(batch.queries, threads)
+    if batch.question in OF_SOLIDS:
+        return OF_SOLIDS[batch.question][0](batch.kind, batch.queries, threads)
     vertex_face = batch.kind == VERTEX_FACE
     if batch.question == CONTACT:
         return (oracle.vertex_face if vertex_face else oracle.edge_edge)(batch.queries, threads)
@@ -103,14 +144,19 @@ def results(batch: Batch, accuracy: str, simd: str) -> Results:
         return core_steps(batch.kind, batch.queries, batch.distances, accuracy, simd)
     if batch.question == MOTION:
         return core_motions(batch.kind, batch.queries, batch.distances, accuracy, simd)
+    if batch.question == POINTS:
+        return core_points(batch.queries, accuracy, simd)
+    if batch.question in OF_SOLIDS:
+        return OF_SOLIDS[batch.question][1](batch.kind, batch.queries, accuracy, simd)
     return _of_snapshots(batch, accuracy, simd)
 
 
 def size_of(batch: Batch) -> np.ndarray:
     """The unit of an error: a step, or the largest coordinate."""
-    if batch.question not in (PROXIMITY, DISTANCES):
+    if batch.question not in (PROXIMITY, DISTANCES, SIGNED, TRANSLATION, DEPTH):
         return np.ones(len(batch.queries))
-    return np.maximum(np.abs(batch.queries).max(axis=(1, 2)), np.finfo(float).tiny)
+    vertices = batch.queries[:, :-1] if batch.question == TRANSLATION else batch.queries
+    return np.maximum(np.abs(vertices).max(axis=(1, 2)), np.finfo(float).tiny)
 
 
 CORE = {VERTEX_FACE: hc.test_vertex_face, EDGE_EDGE: hc.test_edge_edge}

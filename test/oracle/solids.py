@@ -6,6 +6,7 @@ A mesh is a pair (vertices, faces): (V,3) finite numbers, (F,3) integers. thread
 
 from __future__ import annotations
 
+import functools
 from collections import Counter
 from collections.abc import Sequence
 
@@ -19,7 +20,12 @@ POINTS_AT_ONCE = 20_000  # each takes some 300 bytes
 
 def closed(faces: ArrayLike) -> bool:
     """Whether each edge is in exactly two faces, once in each direction."""
-    ways = Counter((f[i], f[i - 2]) for f in np.asarray(faces, int).reshape(-1, 3).tolist() for i in range(3))
+    return _closed(np.asarray(faces, np.int64).tobytes())
+
+
+@functools.cache
+def _closed(faces: bytes) -> bool:
+    ways = Counter((f[i], f[i - 2]) for f in np.frombuffer(faces, np.int64).reshape(-1, 3).tolist() for i in range(3))
     return all(n == 1 and ways[b, a] == 1 for (a, b), n in dict(ways).items())
 
 

@@ -25,12 +25,7 @@ Vec<Integer> direction_number(int number) {
   return {component(), component(), component()};
 }
 
-template <class Crossings>
-int first_known(const Crossings& crossings) {
-  for (int i = 0; i < tries; ++i)
-    if (const auto number = crossings(i)) return *number;
-  throw std::runtime_error("winding number: each direction meets a border of a face");
-}
+[[noreturn]] void fail() { throw std::runtime_error("winding number: each direction meets a border of a face"); }
 
 }  // namespace
 
@@ -74,7 +69,9 @@ std::optional<int> View::crossings(const Corner& point) const {
 }
 
 int winding_number(const std::vector<Corner>& corners, const std::vector<Triangle>& faces, const Corner& point) {
-  return first_known([&](int i) { return View(corners, faces, direction_number(i)).crossings(point); });
+  for (int i = 0; i < tries; ++i)
+    if (const auto number = View(corners, faces, direction_number(i)).crossings(point)) return *number;
+  fail();
 }
 
 Windings winding_numbers(const std::vector<std::array<double, 3>>& vertices, const std::vector<Triangle>& faces,
@@ -82,8 +79,6 @@ Windings winding_numbers(const std::vector<std::array<double, 3>>& vertices, con
   const Integers all = coordinates(vertices, points);
   const std::vector<Corner> corners = corners_of(all.values, 0, vertices.size());
   const std::vector<Corner> centres = corners_of(all.values, vertices.size(), vertices.size() + points.size());
-  std::vector<View> views;
-  for (int i = 0; i < tries; ++i) views.emplace_back(corners, faces, direction_number(i));
   const auto is_on = [&](const std::array<double, 3>& p, const Triangle& face) {
     const auto &a = vertices[face[0]], &b = vertices[face[1]], &c = vertices[face[2]];
     for (std::size_t i = 0; i < 3; ++i)
@@ -91,13 +86,19 @@ Windings winding_numbers(const std::vector<std::array<double, 3>>& vertices, con
     return within_vertex_face({p, a, b, c}, 0.0);
   };
   Windings found{std::vector<std::int32_t>(points.size()), std::vector<std::uint8_t>(points.size())};
-  parallel_for(points.size(), threads, [&](std::size_t i) {
-    found.on_surface[i] =
-        std::any_of(faces.begin(), faces.end(), [&](const Triangle& face) { return is_on(points[i], face); });
-    if (!found.on_surface[i])
-      found.numbers[i] =
-          first_known([&](int view) { return views[static_cast<std::size_t>(view)].crossings(centres[i]); });
-  });
+  std::vector<std::uint8_t> known(points.size());
+  for (int i = 0; std::count(known.begin(), known.end(), 0) > 0; ++i) {
+    if (i == tries) fail();
+    const View view(corners, faces, direction_number(i));
+    parallel_for(points.size(), threads, [&](std::size_t p) {
+      if (known[p]) return;
+      found.on_surface[p] =
+          std::any_of(faces.begin(), faces.end(), [&](const Triangle& face) { return is_on(points[p], face); });
+      const auto number = found.on_surface[p] ? 0 : view.crossings(centres[p]);
+      found.numbers[p] = number.value_or(0);
+      known[p] = number.has_value();
+    });
+  }
   return found;
 }
 
