@@ -18,12 +18,20 @@ class IntersectingFaces:
         self._builder = builder.between_meshes
         self._topologies: tuple[Topology, ...] = ()
         self._detector: hc.Detector | None = None
+        self._hits: hc.Intersections | None = None
+
+    @property
+    def contours(self) -> list[hc.Contour]:
+        """The curves along which meshes intersected in the last call of `of`."""
+        return [] if self._hits is None else self._hits.contours()
 
     def of(self, topologies: tuple[Topology, ...], vertices: Sequence[np.ndarray]) -> list[np.ndarray]:
         """(F,) bool for each mesh: faces that an edge of another mesh intersects, or whose edge intersects one."""
         if self._detector is None or topologies != self._topologies:
-            self._topologies, self._detector = topologies, hc.Detector(self._builder.build(topologies))
-        found = self._detector.intersections(np.concatenate([np.asarray(v, np.float64) for v in vertices])).ef
+            scene = self._builder.build(topologies)
+            self._topologies, self._detector = topologies, hc.Detector(scene, outputs=("points",))
+        hits = self._detector.intersections(np.concatenate([np.asarray(v, np.float64) for v in vertices]))
+        found, self._hits = hits.ef, hits
         firsts = np.cumsum([0, *(topology.n_vertices for topology in topologies)])
         faces = np.concatenate([t.faces.astype(np.int64) + first for t, first in zip(topologies, firsts, strict=False)])
         marked = np.zeros(len(faces), bool)

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.types import NO_EDGES, MeshSettings, Topology
 from hpccd_ros.picture.intersecting import IntersectingFaces
@@ -28,42 +27,24 @@ def save(
 
     azimuth, elevation: degrees, where the camera stands. Each frame is framed on its own.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    from hpccd_ros.picture import panels
 
-    from hpccd_ros.picture.contacts import BACKGROUND, INK, INTERSECTING, as_bytes, render
-
-    columns = min(3, len(indices))
-    rows = -(-len(indices) // columns)
-    size = (width, width * 3 // 4)
-    figure = Figure(figsize=(columns * size[0] / 100, rows * (size[1] + 40) / 100), dpi=100, facecolor=BACKGROUND)
-    FigureCanvasAgg(figure)
-    for panel, index in enumerate(indices):
-        frame = scene.frame(index)
-        parts, marked = _parts(scene, frame)
-        image, _, _ = render(parts, size, azimuth, elevation, intersecting=marked)
-        axes = figure.add_subplot(rows, columns, panel + 1)
-        axes.imshow(image)
-        axes.set_axis_off()
-        axes.set_title(
-            f"{scene.name}, frame {index}: {sum(map(len, scene.faces(index))):,} triangles", color=INK, fontsize=10
-        )
-        if marked.any():
-            what = "bright green: faces that intersect another mesh"
-            axes.text(0.5, -0.01, what, transform=axes.transAxes, ha="center", va="top", color=INTERSECTING, fontsize=8)
-    figure.tight_layout()
-    with whole_file(path, overwrite=True) as draft:
-        draft.write_bytes(as_bytes(figure, draft.suffix, facecolor=BACKGROUND))
+    drawn = []
+    for index in indices:
+        title = f"{scene.name}, frame {index}: {sum(map(len, scene.faces(index))):,} triangles"
+        drawn.append(panels.Panel(title, *_parts(scene, scene.frame(index))))
+    panels.save(drawn, path, azimuth, elevation, width)
 
 
 def _parts(scene, frame):
-    """[(name, vertices, faces, edges)] of a frame, of robots the visual geometry; and which of all faces intersect
-    another mesh."""
+    """[(name, vertices, faces, edges)] of a frame, of robots the visual geometry; which of all faces intersect another
+    mesh; and the curves along which they do."""
     topologies = [
         Topology(0, len(vertices), faces) for vertices, faces in zip(frame, scene.faces(frame.index), strict=True)
     ]
     settings = tuple(MeshSettings(mesh.name, static=mesh.static) for mesh in scene.meshes)
-    marked = IntersectingFaces(SceneBuilder(settings, scene.ignored_pairs)).of(tuple(topologies), frame)
+    intersecting = IntersectingFaces(SceneBuilder(settings, scene.ignored_pairs))
+    marked = intersecting.of(tuple(topologies), frame)
     links = {mesh.name for robot in scene.robots for mesh in robot.meshes}
     parts, flags = [], []
     for name, vertices, topology, of_mesh in zip(scene.mesh_names, frame, topologies, marked, strict=True):
@@ -75,4 +56,5 @@ def _parts(scene, frame):
         for mesh, vertices in zip(seen.meshes, seen.vertices(frame.time), strict=True):
             parts.append((mesh.name, vertices, mesh.faces, NO_EDGES))
             flags.append(np.zeros(len(mesh.faces), bool))
-    return parts, np.concatenate(flags)
+    curves = [c for c in intersecting.contours if c.mesh_a not in links and c.mesh_b not in links]
+    return parts, np.concatenate(flags), curves

@@ -5,11 +5,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
+import hpccd_core as hc
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.frames.types import NO_EDGES, MeshSettings, Topology
-from hpccd_ros.picture import contacts, tint
+from hpccd_ros.picture import contacts, panels, tint
 from hpccd_ros.picture.camera import Camera
 from hpccd_ros.picture.intersecting import IntersectingFaces
 from hpccd_ros.picture.of_recording import separation_fact
@@ -258,3 +260,22 @@ def test_they_are_drawn_in_a_colour_of_their_own():
     for flags, expected in ((marked, [*names, "faces that intersect another mesh"]), (None, names)):
         (legend,) = contacts.compose(dataclasses.replace(picture, intersecting=flags), size=(320, 200)).legends
         assert [text.get_text() for text in legend.texts] == expected
+
+
+def test_intersection_curves_in_a_picture(tmp_path):
+    """In front of surfaces bright, behind them faint; a closed one is closed; none of single points."""
+    vertices, faces = hc.shapes.icosphere(3)
+    scene = hc.Scene()
+    scene.add_mesh("left", faces), scene.add_mesh("right", faces)
+    both = np.concatenate([vertices, vertices + [1.0, 0.1, 0.2]])
+    (contour,) = hc.Detector(scene, outputs=("points",)).intersections(both).contours()
+    point = hc.Contour(contour.rows[:1], contour.points[:1], False, "left", "right")
+    meshes = [("left", both[: len(vertices)], faces, NO_EDGES), ("right", both[len(vertices) :], faces, NO_EDGES)]
+
+    def red(name, contours):
+        panels.save([panels.Panel("spheres", meshes, contours=contours)], tmp_path / name, width=480)
+        r, g, b, *_ = imread(tmp_path / name).transpose(2, 0, 1)
+        return int(((r > 0.8) & (g < 0.6) & (b < 0.5)).sum())
+
+    assert red("none.png", ()) == red("point.png", [point]) == 0
+    assert red("curve.png", [contour]) > 100
