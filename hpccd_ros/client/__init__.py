@@ -23,7 +23,7 @@ from hpccd_ros.client.meshes import (
     vertices_message,
 )
 from hpccd_ros.client.steps import collision_free_step_from_response, collision_free_step_request, goal_from_request
-from hpccd_ros.client.stop import StopListener
+from hpccd_ros.client.stop import SpeedScaleListener, StopListener
 from hpccd_ros.client.topics import (
     CONTACTS_QOS,
     CONTACTS_TOPIC,
@@ -32,6 +32,7 @@ from hpccd_ros.client.topics import (
     LATCHED_CONTACTS_QOS,
     PAIRS_QOS,
     PAIRS_TOPIC,
+    SPEED_SCALE_TOPIC,
     STOP_TIMEOUT,
     STOP_TOPIC,
     TOPOLOGY_QOS,
@@ -60,9 +61,11 @@ __all__ = [
     "Layout",
     "PAIRS_QOS",
     "PAIRS_TOPIC",
+    "SPEED_SCALE_TOPIC",
     "STOP_TIMEOUT",
     "STOP_TOPIC",
     "SceneContacts",
+    "SpeedScaleListener",
     "StopListener",
     "TOPOLOGY_QOS",
     "Topology",

@@ -40,6 +40,12 @@ class DistanceArrays:
         Unit vector from the nearest point of `mesh_a` to that of `mesh_b`; 0 if unknown.
     approach_speed : ndarray, shape (P,), float64
         Decrease of the distance per second since the last snapshot; NaN if unknown.
+    time_to_contact : ndarray, shape (P,), float64
+        Seconds until the meshes touch if they go on as they do; +inf if they do not approach, NaN if unknown.
+    inside : ndarray, shape (P,), uint8
+        ``DistanceArray.INSIDE_NONE``, ``INSIDE_A`` (`mesh_a` lies inside `mesh_b`), ``INSIDE_B`` or ``INSIDE_BOTH``.
+    nearest : int or None
+        Row of the nearest pair of different meshes; None if there is none.
     """
 
     mesh_names: tuple[str, ...]
@@ -52,6 +58,9 @@ class DistanceArrays:
     points: NDArray[np.float64]
     direction: NDArray[np.float64]
     approach_speed: NDArray[np.float64]
+    time_to_contact: NDArray[np.float64]
+    inside: NDArray[np.uint8]
+    nearest: int | None
 
     def __len__(self) -> int:
         return len(self.distance)
@@ -100,6 +109,7 @@ def distances_from_message(message: DistanceArray) -> DistanceArrays:
     """
     count = len(message.distance)
     n_directed = len(message.direction) or len(message.approach_speed)
+    n_timed = len(message.time_to_contact) or len(message.inside)
     return DistanceArrays(
         tuple(message.mesh_names),
         distance=field(message, "distance", np.float64, (count,)),
@@ -111,4 +121,7 @@ def distances_from_message(message: DistanceArray) -> DistanceArrays:
         points=field(message, "points", np.float64, (count, 2, 3)),
         direction=field(message, "direction", np.float64, (count, 3)) if n_directed else np.zeros((count, 3)),
         approach_speed=field(message, "approach_speed", np.float64, (count,)) if n_directed else np.full(count, np.nan),
+        time_to_contact=field(message, "time_to_contact", np.float64, (count,)) if n_timed else np.full(count, np.nan),
+        inside=field(message, "inside", np.uint8, (count,)) if n_timed else np.zeros(count, np.uint8),
+        nearest=int(message.nearest) if message.nearest < count else None,
     )

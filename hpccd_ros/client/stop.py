@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The node's stop topic as one flag, which is false only while a recent message says so."""
+"""The node's topics stop and speed_scale as values that are false, or above 0, only while a recent message says so."""
 
 import threading
 from collections.abc import Callable
@@ -10,11 +10,11 @@ from rclpy.clock_type import ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, Float64
 
 from hpccd_ros.base.clocks import CLOCK_ERROR, Clocks, ClockWatch
 from hpccd_ros.base.quoting import counted
-from hpccd_ros.client.topics import STOP_TIMEOUT, STOP_TOPIC, stop_qos
+from hpccd_ros.client.topics import SPEED_SCALE_TOPIC, STOP_TIMEOUT, STOP_TOPIC, stop_qos
 from hpccd_ros.middleware import graph, message_types
 
 # Fraction of the time-out, the same in the node: silence reads as true before the time-out is over.
@@ -62,6 +62,11 @@ class StopListener:
         If an argument has the wrong type or range.
     """
 
+    _message_type: type = Bool
+    _type_name = message_types.STOP
+    _said = "is true"
+    _silence: Any = True
+
     def __init__(
         self,
         node: Node,
@@ -94,17 +99,19 @@ class StopListener:
         # Earlier messages are not accepted: nothing here has seen whether a clock was set back since they were sent.
         self._begun = self._clocks.system()
         self._sent: int | None = None  # when the newest message was sent; None: none, or its publisher was lost since
-        self._value = True  # of that message
+        self._value = True  # whether that message says stop
         self._sent_true = 0  # when the newest message with true was sent
         self._alive: int | None = None  # None: DDS has not told yet
         self._lost = f"{node.resolve_topic_name(topic)}: no message yet"
         self._elsewhere = ""  # for that reason: a topic that may be meant
-        self._notified = True  # to on_change
+        self._notified: Any = self._silence  # to on_change
         events = SubscriptionEventCallbacks(
             deadline=self._on_deadline, liveliness=self._on_liveliness, incompatible_qos=self._on_incompatible
         )
         on_message: Any = self._on_message  # rclpy's types know no second argument
-        self._subscription = node.create_subscription(Bool, topic, on_message, profile, event_callbacks=events)
+        self._subscription = node.create_subscription(
+            self._message_type, topic, on_message, profile, event_callbacks=events
+        )
         self._topic: str = self._subscription.topic_name
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(self._timeout / _LOOKS, self._notify, clock=steady)
@@ -144,7 +151,7 @@ class StopListener:
             if self._alive is not None and self._alive < self._publishers:
                 return self._too_few(self._alive)
             if self._value:
-                said = f"{self._topic} is true"
+                said = f"{self._topic} {self._said}"
                 if (self._alive or 0) <= self._publishers:
                     return said
                 found, expected = self._alive, self._publishers
@@ -157,19 +164,31 @@ class StopListener:
     def _too_few(self, alive: int) -> str:
         return f"{self._topic}: {counted(alive, 'publisher')} alive, {self._publishers} expected"
 
-    def _on_message(self, message: Bool, info: dict[str, Any]) -> None:
+    def _heard(self) -> Any:
+        """What on_change is about."""
+        return self.stop
+
+    def _says_stop(self, message: Any) -> bool:
+        return bool(message.data)
+
+    def _take(self, message: Any) -> None:
+        """Keep what else the newest message says."""
+
+    def _on_message(self, message: Any, info: dict[str, Any]) -> None:
         sent = info["source_timestamp"]  # 0, and so too old, if the middleware provides none
         with self._lock:
             steady, system = self._clocks.steady(), self._clocks.system()
             self._ages.look(steady, system)
             self._ages.hear(f"a message on {self._topic}", 1e-9 * (sent - system), steady)
             self._sent_true = min(self._sent_true, system)  # a clock may have been set back
-            if message.data:
+            stop = self._says_stop(message)
+            if stop:
                 self._sent_true = max(self._sent_true, sent)
             if sent < self._begun:
                 self._lost = f"{self._topic}: no message was sent since the listener was created"
             elif self._sent is None or sent >= self._sent or self._sent > system:
-                self._value, self._sent = message.data, sent
+                self._value, self._sent = stop, sent
+                self._take(message)
         self._notify()
 
     def _on_deadline(self, event: Any) -> None:
@@ -191,7 +210,7 @@ class StopListener:
             self._search.cancel()
             return
         published = self._node.count_publishers(self._topic) > 0
-        near = "" if published else graph.near_published(self._node, self._topic, message_types.STOP)
+        near = "" if published else graph.near_published(self._node, self._topic, self._type_name)
         found = f"; it has no publisher, and {near} has: if that is meant, give topic={near!r}" if near else ""
         with self._lock:
             self._elsewhere = found if self._alive is None else ""
@@ -221,8 +240,67 @@ class StopListener:
         self._notify()
 
     def _notify(self) -> None:
-        stop = self.stop
+        heard = self._heard()
         with self._lock:
-            changed, self._notified = stop != self._notified, stop
+            changed, self._notified = heard != self._notified, heard
         if changed and self._on_change is not None:
             self._on_change(self)
+
+
+class SpeedScaleListener(StopListener):
+    """Listens to the node's topic speed_scale; ``speed_scale`` is 0 whenever the robot must stop.
+
+    It is above 0 only if a message sent less than ``stop_timeout`` seconds ago says so and its one publisher is alive:
+    silence and whatever makes ``stop`` of a StopListener true make it 0. ``stop`` is true where it is 0, and ``reason``
+    says why.
+
+    Parameters
+    ----------
+    node, topic, stop_timeout, clock_error
+        As of StopListener.
+    on_change : callable, optional
+        Called with this listener after ``speed_scale`` changed; when, is as of StopListener.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument has the wrong type or range.
+    """
+
+    _message_type = Float64
+    _type_name = message_types.SPEED_SCALE
+    _said = "is 0"
+    _silence = 0.0
+
+    def __init__(
+        self,
+        node: Node,
+        topic: str = SPEED_SCALE_TOPIC,
+        stop_timeout: float = STOP_TIMEOUT,
+        *,
+        on_change: "Callable[[SpeedScaleListener], None] | None" = None,
+        clock_error: float = CLOCK_ERROR,
+    ) -> None:
+        self._scale = 0.0
+        call: Any = on_change  # of this class, which it is called with
+        super().__init__(node, topic, stop_timeout, on_change=call, clock_error=clock_error)
+
+    @property
+    def speed_scale(self) -> float:
+        """Factor of the speed, from 0 (stop) to 1 (full speed)."""
+        # A message that comes in between is newer, so that its scale is right too.
+        return self._scale if self._why() is None else 0.0
+
+    def _why(self) -> str | None:
+        if (self._alive or 0) > 1:
+            return f"{self._topic}: {self._alive} publishers alive, and their scales differ; give each a topic"
+        return super()._why()
+
+    def _heard(self) -> float:
+        return self.speed_scale
+
+    def _says_stop(self, message: Any) -> bool:
+        return not message.data > 0  # NaN too
+
+    def _take(self, message: Any) -> None:
+        self._scale = 0.0 if self._value else min(1.0, message.data)

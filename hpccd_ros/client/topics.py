@@ -31,10 +31,12 @@ DISTANCES_TOPIC: str = topic_names.DISTANCES
 PAIRS_TOPIC: str = topic_names.PAIRS
 #: Published where the node's parameter ``stop_distance`` is not negative; see StopListener.
 STOP_TOPIC: str = topic_names.STOP
+#: Published where the node's parameter ``approach_time`` is above 0; see SpeedScaleListener.
+SPEED_SCALE_TOPIC: str = topic_names.SPEED_SCALE
 
 
 def stop_qos(stop_timeout: float = STOP_TIMEOUT) -> QoSProfile:
-    """Quality of service of a subscription to the stop topic that also reports missed deadlines.
+    """Quality of service of a subscription to stop or speed_scale that also reports missed deadlines.
 
     Parameters
     ----------

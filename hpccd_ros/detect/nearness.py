@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import hpccd_core as hc
 from hpccd_core.options import FEATURES
+from hpccd_ros.detect import approach
+from hpccd_ros.detect.approach import Slowdown
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.separation import Separation
@@ -24,6 +26,7 @@ class Nearness:
         self._names = [mesh.name for mesh in builder.meshes]
         self._static = [number for number, mesh in enumerate(builder.meshes) if mesh.static]
         self._apart: SceneFrame | None = None  # no edge intersects a face there
+        self._last_gaps: tuple[SceneFrame, list[hc.Gap]] | None = None
 
     def set(self, options: Options, distance: float) -> None:
         """Set the distance of the next step. May be called from any thread."""
@@ -48,6 +51,16 @@ class Nearness:
         if near is None:
             self._apart = end
         return near, found.options.separation.minimum
+
+    def slowdown(self, start: SceneFrame, end: SceneFrame, distance: float, time: float) -> Slowdown:
+        """How far to slow down after a step that came nowhere within ``distance``. time: s in which meshes may come
+        that near at full speed. Raises the core's errors."""
+        last, gaps = self._last_gaps, self._detector.distances(end)
+        self._last_gaps = end, gaps
+        before = last[1] if last is not None and last[0] is start else self._detector.distances(start)
+        moved = self._detector.approached(start, end, gaps)
+        speeds = approach.closing_speeds(before, gaps, moved, 1e-9 * (end.stamp - start.stamp))
+        return approach.slowdown(gaps, speeds, distance, time)
 
     def _meshes(self, pairs: hc.Contacts | hc.Intersections) -> tuple[str, str] | None:
         """The names of the meshes of the first pair."""

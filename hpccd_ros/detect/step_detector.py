@@ -5,7 +5,10 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 import hpccd_core as hc
+from hpccd_ros.detect import approach
 from hpccd_ros.detect.core import Cancellation, Options, make_detector
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.rigid_step import RigidStep, motions
@@ -20,7 +23,8 @@ class Detection:
 
     ``backend``, ``threads``: those used. ``detect_ms``: wall time of the core's call. ``gaps``: the smallest distance
     of each pair of meshes at the end, if the options request it; ``gaps_backend``: the backend that computed them,
-    which may differ; ``gaps_before``: those at the start, if they were requested then. ``bounds``: of motions by poses
+    which may differ; ``gaps_before``: those at the start, if they were requested then; ``gaps_approached``: of
+    `approach.approached`. ``bounds``: of motions by poses
     or joints. ``tested_pairs``: of the scene, as in SceneBuilder.
     """
 
@@ -37,6 +41,7 @@ class Detection:
     gaps: list[hc.Gap] | None = None
     gaps_backend: str = ""
     gaps_before: list[hc.Gap] | None = None
+    gaps_approached: np.ndarray | None = None
     bounds: MotionBounds = NO_BOUNDS
     tested_pairs: Sequence[tuple[str, str]] = ()
 
@@ -114,6 +119,11 @@ class StepDetector:
         self.prepare_detector()
         return self._detector.distances(self._builder.concatenate(frame, frame))
 
+    def approached(self, start: SceneFrame, end: SceneFrame, gaps: Sequence[hc.Gap]) -> np.ndarray:
+        """(P,): by how much the nearest features of these ``gaps`` at the end approach in the step."""
+        moving = self._builder.concatenate(start, end), self._builder.concatenate(end, end)
+        return approach.approached(gaps, *moving)
+
     def intersect(self, frame: SceneFrame) -> hc.Intersections:
         """The edges that intersect or touch faces in ``frame``. Raises the core's errors."""
         self.prepare_scene(frame)
@@ -131,7 +141,13 @@ class StepDetector:
         gaps, last = self._detector.distances(self._builder.concatenate(end, end)), self._last_gaps
         self._last_gaps = end, gaps
         before = last[1] if last is not None and last[0] is start else None
-        return replace(found, gaps=gaps, gaps_backend=self._detector.backend, gaps_before=before)
+        return replace(
+            found,
+            gaps=gaps,
+            gaps_backend=self._detector.backend,
+            gaps_before=before,
+            gaps_approached=self.approached(start, end, gaps),
+        )
 
     def _detect(self, start: SceneFrame, end: SceneFrame) -> Detection:
         detector = self._detector

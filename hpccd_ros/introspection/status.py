@@ -134,8 +134,14 @@ def _summary(statuses: dict[str, Status], parameters: dict[str, Any]) -> dict[st
         "dropped": int(frames.get("dropped", 0)),
         "dropped_by_reason": _by_reason(frames),
         "last_rejection": frames.get("last_rejection", ""),
-        "stop": {"true": stop["stop"] == "True", "text": statuses["stop"][1]} if stop else None,
+        "stop": _stop(stop, statuses["stop"][1]) if stop else None,
     }
+
+
+def _stop(values: dict[str, str], text: str) -> dict[str, Any]:
+    """speed_scale: None: the node publishes none."""
+    scale = values.get("speed_scale")
+    return {"true": values["stop"] == "True", "text": text, "speed_scale": None if scale is None else float(scale)}
 
 
 def _of_mesh(frames: dict[str, str], mesh: str) -> dict[str, Any]:

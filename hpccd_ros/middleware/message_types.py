@@ -16,6 +16,7 @@ CONTACTS = "hpccd/msg/ContactArray"
 DISTANCES = "hpccd/msg/DistanceArray"
 PAIRS = "hpccd/msg/PairSummaryArray"
 STOP = "std_msgs/msg/Bool"
+SPEED_SCALE = "std_msgs/msg/Float64"
 
 # A name may come from a recording: it must not leave the folders of messages, nor import another module.
 _TYPE_NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/([a-z]+)/([A-Za-z][A-Za-z0-9_]*)")

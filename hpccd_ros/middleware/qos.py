@@ -52,8 +52,8 @@ def contacts(durability: str) -> QoSProfile:
 
 
 def stop(timeout: float, depth: int = 1) -> QoSProfile:
-    """The topic stop: the reader is notified if no message arrived for `timeout` s. Writer and reader may differ, but a
-    reader that requests a shorter time than the writer offers receives nothing.
+    """The topics stop and speed_scale: the reader is notified if no message arrived for `timeout` s. Writer and
+    reader may differ, but a reader that requests a shorter time than the writer offers receives nothing.
 
     Liveliness is manual by topic: it shows that the publishing thread continues. Automatic liveliness would be kept up
     by threads of the middleware while that thread hangs.

@@ -8,8 +8,8 @@ import numpy as np
 from hpccd.msg import ContactArray, DistanceArray
 
 import hpccd_core as hc
+from hpccd_ros.detect import approach
 from hpccd_ros.detect.layout import Layout
-from hpccd_ros.detect.pair_summary import approach_speeds, directions
 from hpccd_ros.middleware.contact_messages import (
     FeaturePairs,
     fill_names,
@@ -59,9 +59,11 @@ def fill_distances(
     layout: Layout,
     *,
     before: list[hc.Gap] | None = None,
+    approached: np.ndarray | None = None,
     seconds: float = 0.0,
 ) -> None:
-    """Write all but header, step, accuracy and backend. before: those of ``seconds`` earlier, if known."""
+    """Write all but header, step, accuracy and backend. before: those of ``seconds`` earlier, if known;
+    approached: as `approach.approached` returns it."""
     count = len(gaps)
     kind, meshes = np.empty(count, np.uint8), np.empty((count, 2), np.uint32)
     features, points = np.full((count, 2, 2), DistanceArray.NONE, np.uint32), np.zeros((count, 2, 3))
@@ -79,8 +81,13 @@ def fill_distances(
     message.mesh_a, message.mesh_b = to_field(meshes[:, 0]), to_field(meshes[:, 1])
     message.features_a, message.features_b = to_field(features[:, 0]), to_field(features[:, 1])
     message.points = to_field(points)
-    message.direction = to_field(directions(gaps))
-    message.approach_speed = to_field(approach_speeds(before, gaps, seconds))
+    message.inside = to_field(np.full(count, DistanceArray.INSIDE_NONE, np.uint8))
+    message.direction = to_field(approach.directions(gaps))
+    message.approach_speed = to_field(approach.approach_speeds(before, gaps, seconds))
+    speeds = approach.closing_speeds(before, gaps, approached, seconds)
+    message.time_to_contact = to_field(approach.times_to_contact(gaps, speeds))
+    if (row := approach.nearest(gaps)) is not None:
+        message.nearest = row
 
 
 def _sides(gap: hc.Gap, layout: Layout):

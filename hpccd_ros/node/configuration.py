@@ -55,11 +55,15 @@ class Configuration:
         """From now on parameters may be set. configured: whether the life cycle is past `unconfigured`."""
 
         def check(wanted: dict[str, Any], meshes: Meshes) -> str | None:
-            if configured() and (wanted["stop_distance"] < 0) != (self.settings["stop_distance"] < 0):
-                return (
-                    f"stop_distance: {wanted['stop_distance']} would switch the topic stop on or off, which it may not "
-                    "be while the node is configured; run hpccd lifecycle deactivate, then cleanup"
-                )
+            for name, topic, off in (
+                ("stop_distance", "stop", lambda value: value < 0),
+                ("approach_time", "speed_scale", lambda value: value == 0),
+            ):
+                if configured() and off(wanted[name]) != off(self.settings[name]):
+                    return (
+                        f"{name}: {wanted[name]} would switch the topic {topic} on or off, which it may not be while "
+                        "the node is configured; run hpccd lifecycle deactivate, then cleanup"
+                    )
             return self._check(wanted, meshes)
 
         def changed() -> None:

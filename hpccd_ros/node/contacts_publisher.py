@@ -75,6 +75,7 @@ class ContactsPublisher:
             found.gaps,
             found.layout,
             before=found.gaps_before,
+            approached=found.gaps_approached,
             seconds=1e-9 * (found.end.stamp - found.start.stamp),
         )
         self._distances.publish(message)

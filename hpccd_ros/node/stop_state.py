@@ -5,6 +5,8 @@ The promise: `stop` is false only if, for every enabled pair, the position of ea
 sent within the last `stop_timeout` seconds, each static mesh has a valid position, no newer message about either was
 rejected, and both stay farther apart than `stop_distance` throughout the last step.
 
+While `stop` is true, the scale of the speed is 0. Otherwise it is that of the last step.
+
 Ages are the system time minus the DDS source timestamp; they are accurate to within `clock_error`, by which the clocks
 of the machines may differ.
 """
@@ -16,9 +18,12 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from hpccd_ros.base.clocks import CLOCK_ERROR, Clocks, ClockWatch
+from hpccd_ros.detect.approach import Slowdown
 from hpccd_ros.frames.drops import Aspect, Reason, Rejection
 from hpccd_ros.frames.types import ALWAYS, OUTDATED, UNKNOWN_TIME, Origin
 from hpccd_ros.node.stop_doubts import Doubt, Source, WatchedScene, leaves_unknown, text_of
+
+_STILL = Slowdown(0.0)
 
 # Part of the time-out after which silence makes stop true, so that listeners receive it within the time-out.
 IN_TIME = 0.95
@@ -50,8 +55,8 @@ class StopState:
 
     distance: that asked for; a result for a smaller one does not count. timeout: s after which listeners must have
     received that a result is too old, from when the oldest message was sent that determines the position of a moving
-    mesh at the end of its step. busy: whether a frame is being processed. clock_error: s. rises: how often stop became
-    true, by cause.
+    mesh at the end of its step. approach_time: s; a result for a shorter one has no scale. busy: whether a
+    frame is being processed. clock_error: s. rises: how often stop became true, by cause.
     """
 
     def __init__(
@@ -60,10 +65,12 @@ class StopState:
         timeout: float,
         busy: Callable[[], bool] = lambda: False,
         *,
+        approach_time: float = 0.0,
         clock_error: float = CLOCK_ERROR,
         clocks: Clocks | None = None,
     ) -> None:
         self.distance = distance
+        self.approach_time = approach_time
         self._held_up = timeout
         self._timeout_ns = round(IN_TIME * 1e9 * timeout)
         self._busy = busy
@@ -79,6 +86,7 @@ class StopState:
         self._robots: Mapping[str, str] = {}
         self._in_use: Mapping[str, Origin] = {}
         self._outdated = ""  # a mesh whose position in the last clear step was outdated
+        self._slowdown = self._published_slowdown = _STILL  # of the last clear step
         self._unpublished: Why | None = None
         self._published: Why | None = None
         self._looked: float | None = None  # when the publishing thread last ran, in steady time
@@ -115,9 +123,16 @@ class StopState:
         """A frame came that ends no step: nothing is known of the motion to it."""
         self._set_cause(Cause.UNANSWERED, "no step has a result since the stream, or a topology, restarted")
 
-    def answered(self, near: tuple[str, str] | None, distance: float, origins: Sequence[Origin]) -> None:
-        """The result of a step for this distance. near: names of two meshes that came within it; None: none did.
-        origins: of the meshes at its end, in the order of the scene."""
+    def answered(
+        self,
+        near: tuple[str, str] | None,
+        distance: float,
+        origins: Sequence[Origin],
+        slowdown: Slowdown = _STILL,
+        approach_time: float = 0.0,
+    ) -> None:
+        """The result of a step for this distance and time of approach. near: names of two meshes that came within it;
+        None: none did. origins: of the meshes at its end, in the order of the scene."""
         with self._condition:
             if not self._active:
                 return
@@ -146,10 +161,16 @@ class StopState:
             self._outdated = next((mesh for mesh, origin in by_name.items() if origin.place == OUTDATED), "")
             self._oldest, self._oldest_of = min(moving, default=(ALWAYS, ""))
             self._why = None
+            self._slowdown = slowdown if approach_time >= self.approach_time else _STILL
             self._rise(before)
 
-    def changed(self, distance: float) -> None:
-        """Another distance is asked for from now on."""
+    def changed(self, distance: float, approach_time: float = 0.0) -> None:
+        """Another distance or time of approach is asked for from now on."""
+        with self._condition:
+            if approach_time > self.approach_time:
+                self._slowdown = _STILL  # until a step has a result for it
+            self.approach_time = approach_time
+            self._condition.notify_all()
         larger, self.distance = distance > self.distance, distance
         if larger:
             self._set_cause(Cause.UNANSWERED, f"no step has a result since stop_distance became {distance:g}")
@@ -195,14 +216,21 @@ class StopState:
         with self._condition:
             return self._now()
 
+    def slowdown(self) -> Slowdown:
+        """As it is now."""
+        with self._condition:
+            return _STILL if self._now() is not None else self._slowdown
+
     def next(self, until: float) -> Why | None:
         """The state to publish: waits until it differs from the one published last, but no longer than ``until``, in
-        steady time. Each rise is published, however short."""
+        steady time. Each rise is published, however short; a scale is part of the state while there is no reason."""
         with self._condition:
             while True:
                 steady, system = self._read_clocks()
                 why = self._unpublished or self._now()
                 if self._unpublished or (why is None) != (self._published is None) or steady >= until or self._closed:
+                    break
+                if why is None and self._slowdown.scale != self._published_slowdown.scale:
                     break
                 left = until - steady
                 if why is None:
@@ -210,7 +238,7 @@ class StopState:
                 self._condition.wait(max(left, 0.0))
             if why is not None and self._published is None:
                 self.rises[why.cause] += 1
-            self._unpublished, self._published = None, why
+            self._unpublished, self._published, self._published_slowdown = None, why, self._slowdown
             return why
 
     def _read_clocks(self) -> tuple[float, int]:

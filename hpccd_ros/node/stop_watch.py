@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From steps, rejections and failures to the topic stop. A thread of its own publishes it, so neither the executor nor
-a detection can delay it."""
+"""From steps, rejections and failures to the topics stop and speed_scale. A thread of its own publishes them, so
+neither the executor nor a detection can delay them."""
 
 import threading
 import time
@@ -9,9 +9,10 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.duration import Duration
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, Float64
 
 from hpccd_core import Cancelled
+from hpccd_ros.detect.approach import Slowdown
 from hpccd_ros.detect.core import CORE_ERRORS
 from hpccd_ros.detect.nearness import Nearness
 from hpccd_ros.detect.scene import SceneBuilder
@@ -34,7 +35,7 @@ _EXPECTED = ("", Cause.INACTIVE, Cause.UNANSWERED, Cause.NEAR)
 
 
 class StopSignal:
-    """Publishes ``state`` at once and periodically until it is closed, then true a last time.
+    """Publishes ``state`` at once and periodically until it is closed, then true, and 0, a last time.
 
     Belongs to a configured ``node``; ends when that is unconfigured.
     """
@@ -44,6 +45,9 @@ class StopSignal:
         self._state = state
         self._period = timeout / REPEATS
         self._publisher = node.configured_publisher(Bool, topic_names.STOP, qos.stop(timeout))
+        self._scale_publisher = None
+        if state.approach_time > 0:
+            self._scale_publisher = node.configured_publisher(Float64, topic_names.SPEED_SCALE, qos.stop(timeout))
         self._log_after, self._logged = 0.0, str(Cause.INACTIVE)
         self._thread = threading.Thread(target=self._run, name="stop", daemon=True)
         self._thread.start()
@@ -55,18 +59,22 @@ class StopSignal:
             return
         self._state.close()
         self._thread.join()
-        if self._node.context.ok():
-            self._publisher.wait_for_all_acked(Duration(seconds=LAST_WORD))
+        for publisher in (self._publisher, self._scale_publisher):
+            if publisher is not None and self._node.context.ok():
+                publisher.wait_for_all_acked(Duration(seconds=LAST_WORD))
 
     def _run(self) -> None:
         due = 0.0
         while True:
             why = self._state.next(due)
+            scale = self._state.slowdown().scale if why is None else 0.0
             due = time.monotonic() + self._period
             if why is None and self._state.why() is not None:
                 continue  # it took too long: the state is no longer valid
             try:
                 self._publisher.publish(Bool(data=why is not None))
+                if self._scale_publisher is not None:
+                    self._scale_publisher.publish(Float64(data=scale))
                 self._log(why)
             except Exception as error:  # silence is read as stop; a thread that ended could never speak again
                 if not self._node.context.ok():
@@ -107,7 +115,10 @@ class StopWatch:
             node.get_logger().warning(
                 f"stop_timeout: {timeout:g} s, so that a publisher that ends is noticed only then; it is in seconds"
             )
-        self._state = StopState(distance, timeout, busy, clock_error=settings["clock_error"])
+        self._approach_time: float = settings["approach_time"]
+        self._state = StopState(
+            distance, timeout, busy, approach_time=self._approach_time, clock_error=settings["clock_error"]
+        )
         self._nearness: Nearness | None = None
         self._nearness_ms = 0.0
         self._signal = StopSignal(node, self._state, timeout)
@@ -130,10 +141,11 @@ class StopWatch:
 
     def apply_change(self) -> None:
         """Follow the parameters."""
-        distance = self._configuration.settings["stop_distance"]
+        settings = self._configuration.settings
+        distance, self._approach_time = settings["stop_distance"], settings["approach_time"]
         if self._nearness is not None:
             self._nearness.set(self._configuration.options, distance)
-        self._state.changed(distance)
+        self._state.changed(distance, self._approach_time)
 
     def first(self) -> None:
         self._state.first()
@@ -141,9 +153,11 @@ class StopWatch:
     def look(self, start: SceneFrame, end: SceneFrame) -> None:
         """Query the distances of a step before its contacts, so that stop rises before they are found. If the query
         fails, stop becomes true, and contacts are computed all the same."""
-        began = time.perf_counter()
+        began, approach_time, slowdown = time.perf_counter(), self._approach_time, Slowdown()
         try:
             near, distance = self._nearness.within(start, end)
+            if near is None and approach_time > 0:
+                slowdown = self._nearness.slowdown(start, end, distance, approach_time)
         except Cancelled:
             raise
         except Exception as error:
@@ -152,7 +166,7 @@ class StopWatch:
                 self._node.errors.caught("stop", error)
             return
         self._nearness_ms = 1e3 * (time.perf_counter() - began)
-        self._state.answered(near, distance, end.origins)
+        self._state.answered(near, distance, end.origins, slowdown, approach_time)
 
     def rejected(self, rejection: Rejection) -> None:
         self._state.rejected(rejection)
@@ -167,7 +181,7 @@ class StopWatch:
 
     def status(self) -> tuple[bytes, str, dict[str, object]]:
         """(level, message, values) for the diagnostics."""
-        why, settings = self._state.why(), self._configuration.settings
+        slowdown, why, settings = self._state.slowdown(), self._state.why(), self._configuration.settings
         values: dict[str, object] = {
             "stop": why is not None,
             "cause": why.cause if why is not None else "",
@@ -176,7 +190,13 @@ class StopWatch:
             "clock_error": settings["clock_error"],
             "look_ms": f"{self._nearness_ms:.3f}",
         }
+        text = "false: nothing is near"
+        if settings["approach_time"] > 0:
+            scale = slowdown.scale if why is None else 0.0
+            slowed_by = " and ".join(slowdown.pair or ())
+            values |= {"approach_time": settings["approach_time"], "speed_scale": scale, "slowed_by": slowed_by}
+            text += f"; speed_scale {scale:.2g}" + (f": {slowed_by} approach" if slowed_by else "")
         values |= {f"rises.{cause}": count for cause, count in sorted(self._state.rises.items())}
         if why is None:
-            return DiagnosticStatus.OK, "false: nothing is near", values
+            return DiagnosticStatus.OK, text, values
         return _WARNED.get(why.cause, DiagnosticStatus.ERROR), f"true: {why.text}", values

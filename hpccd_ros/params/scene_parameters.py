@@ -158,6 +158,11 @@ def check(settings: dict[str, Any], meshes: MeshValues, robots: Robots = NO_ROBO
 
 def check_stop(settings: dict[str, Any], builder: SceneBuilder) -> None:
     """Raises ParameterError."""
+    if settings["approach_time"] > 0 and settings["stop_distance"] < 0:
+        raise ParameterError(
+            f"approach_time: {settings['approach_time']:g} s slows down before stop, and stop_distance "
+            f"{settings['stop_distance']:g} switches stop off; set stop_distance to 0 or more, or approach_time to 0"
+        )
     if settings["stop_distance"] >= 0 and not builder.pairs:
         raise ParameterError(
             "stop_distance: no two different meshes are tested against each other, so nothing could ever be near; name "

@@ -434,6 +434,18 @@ STOP_ROWS = (
         span=(0.01, 3600.0),
     ),
     Row(
+        "approach_time",
+        "float",
+        0.0,
+        "Publish on speed_scale how far to slow down before stop: the least min(1, (distance - stop_distance) / "
+        "(speed of approach * approach_time)) of all pairs of different meshes, and 0 while stop is true; 0: no topic "
+        "speed_scale. It may be changed at any time, but only switched on or off while the node is unconfigured",
+        unit="s",
+        span=(0.0, 3600.0),
+        change=ALWAYS,
+        example=1.0,
+    ),
+    Row(
         "clock_error",
         "float",
         CLOCK_ERROR,

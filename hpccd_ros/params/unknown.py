@@ -67,7 +67,8 @@ def _problem(name: str, settings: dict[str, Any]) -> str:
         return f"{shown}: no such parameter; {_FOREIGN}{near}"
     if first.lower().startswith(_STOP):
         return (
-            f"{shown}: no such parameter; those of the topic stop are {listed(r.name for r in STOP_ROWS)}; {_FOREIGN}"
+            f"{shown}: no such parameter; those of the topics stop and speed_scale are "
+            f"{listed(r.name for r in STOP_ROWS)}; {_FOREIGN}"
         )
     return ""
 

@@ -20,6 +20,7 @@ from hpccd_ros.middleware.message_types import (
     POINTS,
     POSE,
     SHAPE,
+    SPEED_SCALE,
     STOP,
     TOPOLOGY,
     VERTICES,
@@ -41,6 +42,7 @@ RESULTS = {
     topic_names.DISTANCES: DISTANCES,
     topic_names.PAIRS: PAIRS,
     topic_names.STOP: STOP,
+    topic_names.SPEED_SCALE: SPEED_SCALE,
 }
 
 
@@ -81,7 +83,11 @@ def of_node(parameters: dict) -> list[Wanted]:
     wanted += [Wanted(topic, DESCRIPTION, latched=1) for topic in described]
     wanted += [Wanted(topic, JOINT_STATES) for topic in robot_parameters.joint_topics(robots)]
     # Distances and summaries too: they may be switched on at any time. Without stop_distance, stop is of another node.
-    without = {topic_names.STOP} if parameters.get("stop_distance", -1.0) < 0 else {}
+    without = set()
+    if parameters.get("stop_distance", -1.0) < 0:
+        without.add(topic_names.STOP)
+    if parameters.get("approach_time", 0.0) <= 0:
+        without.add(topic_names.SPEED_SCALE)
     return [*wanted, *(Wanted(name, type_name) for name, type_name in RESULTS.items() if name not in without)]
 
 

@@ -20,7 +20,7 @@ from hpccd_ros.replay.frames import PATIENCE, FrameWindow
 from hpccd_ros.replay.input_order import OrderedResult
 
 # Fields of DistanceArray, and how many entries each has for a pair of meshes.
-# Not approach_speed: the recording may lack the previous snapshot.
+# Not approach_speed and time_to_contact: the recording may lack the previous snapshot.
 _PER_PAIR = {
     "mesh_a": 1,
     "mesh_b": 1,
@@ -30,9 +30,10 @@ _PER_PAIR = {
     "features_b": 2,
     "points": 6,
     "direction": 3,
+    "inside": 1,
 }
 # Empty if the recording is older than the field.
-_LATER = ("direction",)
+_LATER = ("direction", "inside")
 
 
 class DistanceCheck:
@@ -160,4 +161,6 @@ def difference(recorded, now) -> str | None:
             if then[row].tobytes() != new[row].tobytes():
                 a, b = (now.mesh_names[getattr(now, side)[row]] for side in ("mesh_a", "mesh_b"))
                 return f"{a} - {b}: {name} {then[row].tolist()} was recorded, now it is {new[row].tolist()}"
+    if len(recorded.inside) and recorded.nearest != now.nearest:
+        return f"nearest {recorded.nearest} was recorded, now it is {now.nearest}"
     return None

@@ -30,6 +30,8 @@ DEPTH = 20
 MOST_QOS = 100_000
 # Seconds that the last messages may take to arrive.
 LAST = 2.0
+# A listener would take their recorded messages for present ones.
+_OF_STOP = {topic_names.STOP: message_types.STOP, topic_names.SPEED_SCALE: message_types.SPEED_SCALE}
 # Seconds of waiting after which the reason is shown.
 TOLD_AFTER = 1.0
 
@@ -63,7 +65,7 @@ def _topics(recording, args) -> list[RecordedTopic]:
     if args.all:
         stop = _stop_topics(recording)
         for name in stop:
-            _print_status(f"{name} is not published: a listener would take a recorded false for a present one")
+            _print_status(f"{name} is not published: a listener would take a recorded message for a present one")
         return [topic for name, topic in recording.topics.items() if name not in stop]
     setup = recorded_setup.of_recording(recording, args.params)
     inputs = {*setup.roles, *setup.described_on}
@@ -71,13 +73,17 @@ def _topics(recording, args) -> list[RecordedTopic]:
 
 
 def _stop_topics(recording) -> list[str]:
-    """Those that the recorder stored as the node's topic stop; from another recorder, those of its type and name."""
+    """Those that the recorder stored as the node's topics stop and speed_scale; from another recorder, those with
+    their types and names."""
     stored = (recording.info or {}).get("topics")
     roles = stored if isinstance(stored, dict) else {}
     return [
         name
         for name, topic in recording.topics.items()
-        if topic.type_name == message_types.STOP and topic_names.STOP in (roles.get(name), name.rpartition("/")[2])
+        if any(
+            topic.type_name == type_name and own in (roles.get(name), name.rpartition("/")[2])
+            for own, type_name in _OF_STOP.items()
+        )
     ]
 
 

@@ -222,6 +222,11 @@ def test_smallest_distances():
     told = three_distances(direction=[0.0, 0.6, 0.8] * 3, approach_speed=[1.0, -2.0, math.nan])
     told = client.distances_from_message(told)
     assert told.direction[1].tolist() == [0, 0.6, 0.8] and told.approach_speed[:2].tolist() == [1, -2]
+    assert np.isnan(told.time_to_contact).all() and told.inside.tolist() == [0, 0, 0] and told.nearest is None
+    told = client.distances_from_message(
+        three_distances(time_to_contact=[math.inf, 0.5, math.nan], inside=[0, 2, 0], nearest=1)
+    )
+    assert told.time_to_contact[1] == 0.5 and told.inside[told.nearest] == DistanceArray.INSIDE_B
     nothing = client.distances_from_message(DistanceArray(mesh_names=["a", "b"]))
     assert len(nothing) == 0 and nothing.between("a", "b") == math.inf, "not tested against each other"
 
@@ -233,6 +238,7 @@ def test_smallest_distances():
         (dict(points=[0.0] * 6), r"points has 6 values, 18 were expected for shape \(3, 2, 3\)"),
         (dict(mesh_a=[0, 1, 2]), "mesh_a names a mesh beyond the 2 of mesh_names"),
         (dict(direction=[0.0] * 9), r"approach_speed has 0 values, 3 were expected for shape \(3,\)"),
+        (dict(inside=[0] * 3), r"time_to_contact has 0 values, 3 were expected for shape \(3,\)"),
         (dict(approach_speed=[0.0] * 3), r"direction has 0 values, 9 were expected for shape \(3, 3\)"),
     ],
 )

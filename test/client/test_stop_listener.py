@@ -2,6 +2,7 @@
 """StopListener beside publishers of stop, over DDS: whatever is missing reads as true."""
 
 import itertools
+import math
 import os
 import threading
 import time
@@ -10,7 +11,7 @@ import pytest
 import rclpy
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, Float64
 
 from hpccd_ros import client
 from hpccd_ros.base.clocks import Clocks
@@ -25,11 +26,13 @@ class Speaker:
     """Publishes on stop in a context of its own, every tenth of the time-out, until it is silent or closed."""
 
     def __init__(self, namespace, profile=None):
-        self.says = False
+        self.says, self.scale = False, 1.0
         self.context = rclpy.Context()
         rclpy.init(context=self.context)
         self.node = Node("speaker", namespace=namespace, context=self.context)
-        self._publisher = self.node.create_publisher(Bool, "stop", profile or qos.stop(TIMEOUT))
+        profile = profile or qos.stop(TIMEOUT)
+        self._publisher = self.node.create_publisher(Bool, "stop", profile)
+        self._scale_publisher = self.node.create_publisher(Float64, "speed_scale", profile)
         self._ended = threading.Event()
         self._silent = False
         self._thread = threading.Thread(target=self._run)
@@ -39,6 +42,7 @@ class Speaker:
         while not self._ended.wait(TIMEOUT / 10):
             if not self._silent:
                 self._publisher.publish(Bool(data=self.says))
+                self._scale_publisher.publish(Float64(data=self.scale))
 
     def silent(self, silent=True):
         self._silent = silent
@@ -292,3 +296,47 @@ def test_more_publishers_than_expected_are_in_the_reason(place):
 def test_a_callback_that_cannot_be_called(place):
     with pytest.raises(TypeError, match="on_change: expected a callable, got str"):
         place.listener(on_change="print")
+
+
+def test_speed_scale(place):
+    """0 before the first message, in silence, and for what is no number from 0 to 1."""
+    changes = []
+    listener = client.SpeedScaleListener(
+        place.node, stop_timeout=TIMEOUT, on_change=lambda of: changes.append(of.speed_scale)
+    )
+    assert listener.speed_scale == 0 and listener.reason == f"{place.namespace}/speed_scale: no message yet"
+    speaker = place.speaker()
+    for scale, heard in ((1.0, 1.0), (0.25, 0.25), (0.0, 0.0), (7.0, 1.0), (math.nan, 0.0), (0.5, 0.5), (-1.0, 0.0)):
+        speaker.scale = scale
+        place.until(lambda heard=heard: listener.speed_scale == heard, str(scale))
+        assert listener.stop == (heard == 0)
+        assert listener.reason == ("" if heard else f"{place.namespace}/speed_scale is 0")
+    assert changes == [1, 0.25, 0, 1, 0, 0.5, 0]
+    speaker.scale = 1.0
+    place.until(lambda: listener.speed_scale == 1, "1")
+    speaker.silent()
+    place.until(lambda: listener.speed_scale == 0, "silence")
+    speaker.silent(False)
+    place.until(lambda: listener.speed_scale == 1, "1")
+    other = place.speaker()
+    place.until(lambda: "2 publishers alive" in listener.reason, "two publishers")
+    assert listener.speed_scale == 0
+    other.close()
+    place.until(lambda: listener.speed_scale == 1, "1")
+    listener.close()
+    assert listener.speed_scale == 0
+
+
+def test_speed_scale_when_the_executor_stands_still(place):
+    listener = client.SpeedScaleListener(place.node, stop_timeout=TIMEOUT)
+    place.speaker()
+    place.until(lambda: listener.speed_scale == 1, "1")
+    time.sleep(1.5 * TIMEOUT)
+    assert listener.speed_scale == 0 and "the last message taken was sent" in listener.reason
+
+
+def test_speed_scale_in_another_namespace_is_named(place):
+    listener = client.SpeedScaleListener(place.node, stop_timeout=TIMEOUT)
+    place.speakers.append(Speaker(f"{place.namespace}/cell1"))
+    there = f"{place.namespace}/cell1/speed_scale"
+    place.until(lambda: listener.reason.endswith(f"give topic='{there}'"), "the topic that has a publisher")

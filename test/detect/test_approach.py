@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Direction and speed of approach of the nearest parts of two meshes. No ROS."""
+"""Direction and speed of approach of the nearest parts of two meshes, and how far to slow down. No ROS."""
 
 import math
 
@@ -7,8 +7,16 @@ import numpy as np
 import pytest
 
 import hpccd_core as hc
+from hpccd_ros.detect.approach import (
+    approach_speeds,
+    closing_speeds,
+    directions,
+    nearest,
+    slowdown,
+    times_to_contact,
+)
 from hpccd_ros.detect.core import Options
-from hpccd_ros.detect.pair_summary import approach_speeds, directions
+from hpccd_ros.detect.nearness import Nearness
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.step_detector import StepDetector
 from hpccd_ros.frames.types import MeshSettings, SceneFrame, Topology
@@ -72,3 +80,94 @@ def test_a_step_knows_the_distances_at_its_start_where_they_were_asked_for():
     assert detector.detect(*frames[2:4]).gaps_before is None
     detector.options = Options(backend="cpu", threads=1, distances=True)
     assert detector.detect(frames[3], frames[4]).gaps_before is not None, "of frame 3 they were asked above"
+
+
+def above_the_floor(random, count):
+    """Frames of a hand above a wide floor, whose smallest distance is the lowest corner's height: (hands, floor
+    heights, stamps in ns)."""
+    steps = np.cumsum(random.normal(0, 0.3, (count, 3, 3)), axis=0)
+    hands = HAND + (0, 0, 8) + steps - (0, 0, 0.4) * np.arange(count)[:, None, None]
+    return hands, random.uniform(-0.2, 0.2, count), np.cumsum(random.integers(1, 10**9, count))
+
+
+def heights(hand, floor):
+    return hand[:, 2] - floor
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_speeds_times_and_scales_are_those_of_the_lowest_corner(seed):
+    """Of a stream in which single steps are left out, as where a frame is lost."""
+    random = np.random.default_rng(seed)
+    hands, floors, stamps = above_the_floor(random, 12)
+    frames = [
+        SceneFrame(int(stamp), k, "", TOPOLOGIES, (hand, FLOOR + (0, 0, floor)), ("a",), 0.0)
+        for k, (hand, floor, stamp) in enumerate(zip(hands, floors, stamps, strict=True))
+    ]
+    builder = SceneBuilder(tuple(map(MeshSettings, "ab")))
+    nearness, steps = Nearness(builder, Options(backend="cpu", threads=1), 0.5), 0
+    detector = StepDetector(builder, Options(backend="cpu", threads=1, distances=True))
+    detector.detect(frames[0], frames[0])
+    kept = [0, *sorted(random.choice(np.arange(1, 12), 8, replace=False))]
+    for i, j in zip(kept, kept[1:], strict=False):
+        seconds = 1e-9 * (stamps[j] - stamps[i])
+        before, now = heights(hands[i], floors[i]), heights(hands[j], floors[j])
+        found = detector.detect(frames[i], frames[j])
+        lowest = now.argmin()
+        if min(before.min(), now.min()) <= 0.5:
+            break
+        mean, own = (before.min() - now.min()) / seconds, (before[lowest] - now[lowest]) / seconds
+        speed = max(mean, own)
+        speeds = closing_speeds(found.gaps_before, found.gaps, found.gaps_approached, seconds)
+        assert speeds[1] == pytest.approx(speed, rel=1e-9, abs=1e-9)
+        contact = now.min() / speed if speed > 0 else math.inf
+        assert times_to_contact(found.gaps, speeds)[1] == pytest.approx(contact, rel=1e-9)
+        if nearness.within(frames[i], frames[j])[0] is None:
+            scale = min(1.0, (now.min() - 0.5) / (speed * 2.0)) if speed > 0 else 1.0
+            slowed = nearness.slowdown(frames[i], frames[j], 0.5, 2.0)
+            assert slowed.scale == pytest.approx(scale, rel=1e-9)
+            assert slowed.pair == (("a", "b") if scale < 1 else None)
+            steps += 1
+    assert steps
+
+
+@pytest.mark.parametrize(
+    "distance, speed, scale",
+    [
+        (1.5, 1.0, 0.5),
+        (5.0, 1.0, 1.0),
+        (5.0, 0.0, 1.0),
+        (1.5, -1.0, 1.0),
+        (1.0, 1.0, 0.0),
+        (0.5, 1.0, 0.0),
+        (1.5, math.nan, 0.0),
+        (1.5, math.inf, 0.0),
+        (math.inf, math.inf, 0.0),
+        (1e300, 1e300, 0.5),
+        (1.0 + 2**-52, 5e-324, 1.0),
+    ],
+)
+def test_scale_of_one_pair(distance, speed, scale):
+    """Within stop_distance 1 and where the speed is unknown it is 0; where they move apart, 1."""
+    found = slowdown([gap(9.0), gap(distance)], np.array([0.0, speed]), 1.0, 2.0 if speed != 1.0 else 1.0)
+    assert found.scale == pytest.approx(scale, abs=1e-15)
+
+
+def test_the_least_of_all_pairs_counts_and_no_pair_counts_nothing():
+    far, near = gap(9.0), hc.Gap("c", "d", 2.0, "edge-edge", (0, 0), np.zeros((2, 3)))
+    none = hc.Gap("a", "c", math.inf, "", (), np.empty((0, 3)))
+    found = slowdown([none, far, near], np.array([math.nan, 1.0, 1.0]), 1.0, 4.0)
+    assert (found.scale, found.pair) == (0.25, ("c", "d"))
+    assert slowdown([none], np.array([math.nan]), 1.0, 4.0).scale == 1
+    assert (nearest([none, far, near]), nearest([none]), nearest([far, far])) == (2, None, 0)
+
+
+def test_unknown_speeds():
+    """Without the previous distances, and for stamps that do not advance."""
+    moved, gaps = np.array([1.0]), [gap(2.0)]
+    for before, seconds in ((None, 1.0), (gaps, 0.0), (gaps, -1.0)):
+        speeds = closing_speeds(before, gaps, moved, seconds)
+        assert np.isnan(speeds).all() and np.isnan(times_to_contact(gaps, speeds)).all()
+        assert slowdown(gaps, speeds, 0.0, 1.0).scale == 0
+    assert closing_speeds(gaps, gaps, np.array([math.nan]), 0.5).tolist() == [0]
+    touching = [gap(0.0, kind="edge-face")]
+    assert times_to_contact(touching, np.array([math.nan])).tolist() == [0]

@@ -109,6 +109,12 @@ def test_smallest_distances():
     before = [dataclasses.replace(gap, distance=0.75) for gap in gaps]
     snapshot_messages.fill_distances(message, gaps, LAYOUT, before=before, seconds=0.25)
     assert list(message.approach_speed[:3]) == [1, 2, 3] and math.isnan(message.approach_speed[3])
+    assert list(message.time_to_contact[:3]) == [0.5, 0.125, 0.0] and math.isnan(message.time_to_contact[3])
+    snapshot_messages.fill_distances(
+        message, gaps, LAYOUT, before=before, approached=np.array([1.0, -1.0, math.nan, math.nan]), seconds=0.25
+    )
+    assert list(message.time_to_contact[:3]) == [0.125, 0.125, 0.0], "the larger speed of both"
+    assert message.nearest == 2 and list(message.inside) == [DistanceArray.INSIDE_NONE] * 4
     assert (message.mesh_names, list(message.topology_versions)) == (["cloth", "ball", "floor"], [3, 0, 9])
 
 

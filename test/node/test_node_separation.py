@@ -169,6 +169,9 @@ def test_direction_and_speed_of_approach(start_node):
     rows = [next(row for row in range(3) if arrays.mesh_a[row] != arrays.mesh_b[row]) for arrays in told]
     speeds = [arrays.approach_speed[row] for arrays, row in zip(told, rows, strict=True)]
     assert speeds[1:4] == [0.5, -0.25, 1.25] and math.isnan(speeds[0]) and math.isnan(speeds[4])
+    times = [arrays.time_to_contact[row] for arrays, row in zip(told, rows, strict=True)]
+    assert times[1:4] == [1.0, math.inf, 0.0] and math.isnan(times[0]) and math.isnan(times[4])
+    assert [arrays.nearest for arrays in told] == rows
     down = [arrays.direction[row].tolist() for arrays, row in zip(told, rows, strict=True)]
     assert down == [[0, 0, -1]] * 3 + [[0, 0, 0], [0, 0, -1]], "from the vertex of the hand; none where they touch"
 

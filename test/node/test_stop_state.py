@@ -7,6 +7,7 @@ import time
 import pytest
 
 from hpccd_ros.base.clocks import Clocks
+from hpccd_ros.detect.approach import Slowdown
 from hpccd_ros.frames.drops import Aspect, Input, Reason, Rejection
 from hpccd_ros.frames.types import ALWAYS, OUTDATED, UNKNOWN_TIME, Origin
 from hpccd_ros.node.stop_doubts import WatchedScene
@@ -46,11 +47,11 @@ def state(times):
     return made
 
 
-def clear(state, near=None, distance=0.25, hand=None, table=1, tip=None, **origin):
-    """A step whose last messages were sent at these times; None: now."""
+def clear(state, near=None, distance=0.25, hand=None, table=1, tip=None, scaled=(), **origin):
+    """A step whose last messages were sent at these times; None: now. scaled: arguments of StopState.answered."""
     now = state.times.now
     places = (now if hand is None else hand, table, now if tip is None else tip)
-    state.answered(near, distance, [Origin(place, **origin) for place in places])
+    state.answered(near, distance, [Origin(place, **origin) for place in places], *scaled)
 
 
 def cause(state):
@@ -81,6 +82,58 @@ def test_an_answer_for_a_smaller_distance_does_not_count(state):
     assert cause(state) is None
     state.changed(0.1)
     assert cause(state) is None
+
+
+def scale(state):
+    """As the thread that publishes sees it."""
+    state.next(0.0)
+    return state.slowdown().scale
+
+
+def test_the_scale_of_the_last_step_counts_while_stop_is_false(state):
+    """0 before the first result, and whatever makes stop true."""
+    assert scale(state) == 0
+    clear(state, scaled=(Slowdown(0.5, PAIR), 1.0))
+    assert scale(state) == 0.5 and state.slowdown().pair == PAIR
+    clear(state, near=PAIR, scaled=(Slowdown(0.5), 1.0))
+    assert scale(state) == 0
+    clear(state, scaled=(Slowdown(0.75), 1.0))
+    assert scale(state) == 0.75
+    state.rejected(Rejection("hand", Reason.NOT_FINITE))
+    assert scale(state) == 0
+    state.times.pass_by(1.0)
+    clear(state, scaled=(Slowdown(0.75), 1.0))
+    assert scale(state) == 0.75
+    state.times.pass_by(IN_TIME * TIMEOUT)
+    assert scale(state) == 0, "silence"
+    clear(state, scaled=(Slowdown(), 1.0))
+    assert scale(state) == 1
+    for failing in (state.first, lambda: state.failed("of memory"), state.end):
+        failing()
+        assert scale(state) == 0
+
+
+def test_a_scale_for_a_shorter_time_does_not_count(state):
+    state.changed(0.25, 1.0)
+    clear(state, scaled=(Slowdown(0.5), 1.0))
+    state.changed(0.25, 2.0)
+    assert (cause(state), scale(state)) == (None, 0)
+    clear(state, scaled=(Slowdown(0.5), 1.0))
+    assert (cause(state), scale(state)) == (None, 0)
+    clear(state, scaled=(Slowdown(0.25), 2.0))
+    assert scale(state) == 0.25
+    state.changed(0.25, 1.0)
+    assert scale(state) == 0.25
+    state.changed(0.5, 1.0)
+    assert (cause(state), scale(state)) == (Cause.UNANSWERED, 0)
+
+
+def test_a_changed_scale_is_published_at_once(state):
+    clear(state, scaled=(Slowdown(0.5), 1.0))
+    state.next(0.0)
+    clear(state, scaled=(Slowdown(0.25), 1.0))
+    until = state.times.steady + 3600.0
+    assert state.next(until) is None and state.slowdown().scale == 0.25
 
 
 def test_nothing_counts_while_inactive(times):

@@ -197,6 +197,8 @@ def test_distances_of_a_scene_without_pairs_are_verified(near_bag, tmp_path, hpc
 
 def test_results_from_before_there_were_directions_are_verified(changed):
     assert _counts(_replay(changed(1, direction=[], approach_speed=[]))[0].distances) == (7, 0, 0)
+    before = changed(1, time_to_contact=[], inside=[], nearest=2**32 - 1)
+    assert _counts(_replay(before)[0].distances) == (7, 0, 0)
 
 
 @pytest.mark.parametrize(
@@ -209,6 +211,8 @@ def test_results_from_before_there_were_directions_are_verified(changed):
         ({"accuracy": "best"}, "accuracy 'best' is none of fast"),
         ({"points": [0.0] * 12}, "points ["),
         ({"direction": [0.5] * 6}, "direction ["),
+        ({"inside": [0, 2]}, "inside [2] was recorded, now it is [0]"),
+        ({"nearest": 0}, "nearest 0 was recorded, now it is 1"),
         ({"direction": [0.5]}, "direction has 1 entries, 6 belong to 2 pairs of meshes"),
     ],
 )
