@@ -4,6 +4,7 @@
 import dataclasses
 import io
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -11,8 +12,10 @@ from matplotlib.colors import LinearSegmentedColormap, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+import hpccd_core as hc
 from hpccd_ros.base.quoting import shortened
 from hpccd_ros.base.whole_file import whole_file
+from hpccd_ros.picture import curves
 from hpccd_ros.picture.camera import Camera
 from hpccd_ros.picture.raster import rasterize
 from hpccd_ros.picture.shading import RADIUS, shade, tubes
@@ -47,6 +50,7 @@ class Picture:
     facts: list[str]
     scene: str = ""  # name, at the right of the title
     intersecting: np.ndarray | None = None
+    contours: Sequence[hc.Contour] = ()  # along which meshes intersect
 
 
 @dataclasses.dataclass
@@ -96,7 +100,8 @@ def _of_drawable_size(picture: Picture) -> Picture:
         return picture
     exponent = -int(np.frexp(largest)[1])  # of two: no digit changes
     meshes = [(name, np.ldexp(np.asarray(v, np.float64), exponent), *of) for name, v, *of in picture.meshes]
-    return dataclasses.replace(picture, meshes=meshes, points=np.ldexp(picture.points, exponent))
+    contours = [dataclasses.replace(c, points=np.ldexp(c.points, exponent)) for c in picture.contours]
+    return dataclasses.replace(picture, meshes=meshes, points=np.ldexp(picture.points, exponent), contours=contours)
 
 
 def render(meshes, size, azimuth, elevation, contacts=None, intersecting=None):
@@ -180,6 +185,7 @@ def _paint(vertices, faces, contacts, intersecting):
 def _draw_scene(axes, image, camera, depth, picture):
     axes.imshow(image, extent=(0, image.shape[1], image.shape[0], 0), interpolation="lanczos")
     axes.set_axis_off()
+    curves.draw(axes, picture.contours, camera, depth, SUPERSAMPLING)
     if not len(picture.points):
         return
     seen = camera.project(picture.points)
@@ -208,6 +214,8 @@ def _write_title(figure, picture):
     colours = dict(zip(mesh_groups(names), mesh_colours(names), strict=True))
     if picture.intersecting is not None and picture.intersecting.any():
         colours["faces that intersect another mesh"] = INTERSECTING
+    if any(len(contour) > 1 for contour in picture.contours):
+        colours["intersection curves"] = curves.COLOUR
     if len(colours) <= MOST_NAMES:
         figure.legend(
             handles=[Patch(color=colour) for colour in colours.values()],

@@ -3,6 +3,7 @@
 
 import numpy as np
 
+import hpccd_core as hc
 from hpccd_core.options import FEATURES
 from hpccd_ros.detect.separation import Separation
 from hpccd_ros.picture import contacts as picture
@@ -45,7 +46,8 @@ def draw_step(
         f"{step.total:,} contact{'' if step.total == 1 else 's'} in step {step.step}" + of,
         facts(step),
         title,
-        marked,
+        intersecting=marked,
+        contours=[] if intersecting is None else _seen(intersecting, step, meshes),
     )
     context = None
     if history is not None and len(history.steps) > 1:
@@ -97,6 +99,13 @@ def _marked(intersecting: IntersectingFaces, step: ReplayedStep, meshes) -> np.n
             for name, _, faces, _ in meshes
         ]
     )
+
+
+def _seen(intersecting: IntersectingFaces, step: ReplayedStep, meshes) -> list[hc.Contour]:
+    """The curves between meshes that are drawn as they are tested, not by visual geometry."""
+    tested = dict(zip(step.layout.mesh_names, step.end_frame.topologies, strict=True))
+    drawn = {name for name, _, faces, _ in meshes if name in tested and tested[name].faces is faces}
+    return [contour for contour in intersecting.contours if {contour.mesh_a, contour.mesh_b} <= drawn]
 
 
 def meshes_in_the_middle(step: ReplayedStep, visual: VisualGeometry = NO_VISUAL):

@@ -279,3 +279,15 @@ def test_intersection_curves_in_a_picture(tmp_path):
 
     assert red("none.png", ()) == red("point.png", [point]) == 0
     assert red("curve.png", [contour]) > 100
+    picture = contacts.Picture(meshes, np.empty((0, 3)), np.empty(0), "title", [], contours=[contour, point])
+    figure = contacts.compose(picture, size=(320, 200))
+    assert figure.legends[0].texts[-1].get_text() == "intersection curves"
+    tiny = dataclasses.replace(
+        picture,
+        meshes=[(name, 1e-30 * v, *of) for name, v, *of in meshes],
+        contours=[dataclasses.replace(contour, points=1e-30 * contour.points)],
+    )
+    lines, others = (list(f.axes[0].collections) for f in (figure, contacts.compose(tiny, size=(320, 200))))
+    assert len(lines) == len(others) == 2
+    assert [len(c.get_segments()) for c in lines] == [len(c.get_segments()) for c in others]
+    assert sum(len(c.get_segments()) for c in lines) == len(contour)

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The curves along which meshes intersect."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+
+import hpccd_core as hc
+from hpccd_ros.picture.camera import Camera
+
+COLOUR = "#ff5f45"
+
+
+def draw(axes: Axes, contours: Sequence[hc.Contour], camera: Camera, depth: np.ndarray, scale: float = 1.0) -> None:
+    """Draw intersection curves over a rendered image; faint where they are behind a surface.
+
+    depth: (h, w), in the pixels of the camera. scale: pixels of the camera in a unit of the axes.
+    """
+    ends = [np.concatenate([c.points, c.points[:1]]) if c.closed else c.points for c in contours if len(c) > 1]
+    if not ends:
+        return
+    segments = np.concatenate([np.stack([points[:-1], points[1:]], axis=1) for points in ends])
+    seen = camera.project(segments.reshape(-1, 3)).reshape(-1, 2, 3)
+    middle = seen.mean(axis=1)
+    column = np.clip(middle[:, 0].astype(int), 0, depth.shape[1] - 1)
+    row = np.clip(middle[:, 1].astype(int), 0, depth.shape[0] - 1)
+    hidden = middle[:, 2] > depth[row, column] + 0.01 * np.ptp(depth[np.isfinite(depth)])
+    for which, alpha in ((hidden, 0.45), (~hidden, 1.0)):
+        lines = seen[which, :, :2] / scale
+        axes.add_collection(LineCollection(lines, colors=COLOUR, linewidths=1.6, alpha=alpha, capstyle="round"))
