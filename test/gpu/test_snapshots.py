@@ -35,8 +35,7 @@ def assert_hits_same(cpu, gpu, vertices):
     for _ in range(2):
         found = gpu.intersections(vertices)
         assert_on_gpu(gpu)
-        np.testing.assert_array_equal(found.ef, expected.ef)
-        assert found.hash == expected.hash
+        assert found == expected  # the outputs too
     return expected
 
 
@@ -63,7 +62,16 @@ def test_random_scenes(make, dtype, accuracy):
 @pytest.mark.parametrize("make", (scenes.crumpled, scenes.lattice, scenes.soup, scenes.fringed))
 def test_intersections_of_tangled_scenes(make):
     scene, _, vertices = scenes.join([make(np.random.default_rng(2), 24)])
-    assert len(assert_hits_same(*detectors(scene), vertices)) > 0
+    assert len(assert_hits_same(*detectors(scene, outputs=("points", "directions")), vertices)) > 0
+
+
+def test_curves_are_on_the_host_only():
+    scene, vertices, _ = scenes.join([scenes.crumpled(np.random.default_rng(2), 24)])
+    found = hc.Detector(scene, results="device", outputs=("points", "directions")).intersections(vertices)
+    for name in ("points", "edge_parameters", "weights", "incidences", "directions", "contours", "regions"):
+        with pytest.raises(hc.OutputNotComputed, match=rf"{name}: not computed in a GPU's memory; .*results='host'"):
+            getattr(found, name)
+    assert not hasattr(found, "points") and not hasattr(found, "anything")
 
 
 @pytest.mark.parametrize("scale, offset", ((1e-150, 0.0), (1e-20, 0.0), (1e148, 0.0), (1e290, 0.0), (1.0, 2.0**30)))
