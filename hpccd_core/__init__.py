@@ -24,6 +24,7 @@ from .prepared import PreparedDetection
 from .proximity import Gap, Intersections, Proximity
 from .results import OutputNotComputed
 from .scene import Scene
+from .solids import SignedDistances, closed
 
 __all__ = [
     "Cancelled",
@@ -44,8 +45,10 @@ __all__ = [
     "PreparedDetection",
     "Proximity",
     "Scene",
+    "SignedDistances",
     "__version__",
     "backends",
+    "closed",
     "gpu_status",
     "load_mesh",
     "shapes",

@@ -339,6 +339,28 @@ def _is_list_of_meshes(value: object) -> TypeGuard[Sequence[object]]:
     return all(isinstance(mesh, np.ndarray) and mesh.ndim == 2 for mesh in value)
 
 
+def points(name: str, value: object, worlds: int | None) -> NDArray[Any]:
+    """(K, 3), or of many worlds (W, K, 3), float32 or float64, C-contiguous."""
+    array = _reals(name, value if type(value) is np.ndarray else _array(name, value), value)
+    shape_of_points(name, array.shape, worlds)
+    return np.require(array, None, ["C", "A"])
+
+
+def shape_of_points(name: str, shape: tuple[int, ...], worlds: int | None) -> tuple[int, ...]:
+    """The shape, if it is that of points."""
+    expected = "(K, 3)" if worlds is None else f"({worlds}, K, 3)"
+    if len(shape) == (2 if worlds is None else 3) and shape[-1] == 3 and worlds in (None, shape[0]):
+        return shape
+    remedy = ""
+    if len(shape) == 1:
+        remedy = f"; for one point give {name}=[point]" if shape == (3,) else ""
+    elif shape[-2:-1] == (3,) and shape[-1] != 3 and len(shape) == 2:
+        remedy = f"; transpose it: {name}.T"
+    elif len(shape) == 2 and worlds is not None:
+        remedy = "; give points for each world"
+    raise ValueError(f"{name}: expected shape {expected}, got {shape}{remedy}")
+
+
 def group_numbers(value: object, layout: MeshLayout) -> NDArray[np.int64]:
     """(V,) int64, each at least -1."""
     array = _array("groups", value)

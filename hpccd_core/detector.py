@@ -40,6 +40,7 @@ from .proximity import Gap, Intersections, Proximity
 from .result_types import DistancesResult, IntersectionsResult, MotionResult, Options, ProximityResult, StepResult
 from .scene import Scene
 from .snapshot_queries import SnapshotQueries
+from .solid_queries import SolidQueries
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack  # typing has it from Python 3.11 on
@@ -67,7 +68,9 @@ def _require_device(backend: str, method: str) -> None:
 
 
 class Detector(
-    MotionQueries[MotionResult, StepResult], SnapshotQueries[ProximityResult, IntersectionsResult, DistancesResult]
+    MotionQueries[MotionResult, StepResult],
+    SnapshotQueries[ProximityResult, IntersectionsResult, DistancesResult],
+    SolidQueries,
 ):
     """Finds every contact of a scene whose vertices move on straight lines from one set of positions to the next.
 
@@ -118,10 +121,10 @@ class Detector(
     Notes
     -----
     Queries of a motion: :meth:`detect`, :meth:`step`, :meth:`collision_free_step`, :meth:`collision_free_motion`.
-    Queries of one frame: :meth:`proximity`, :meth:`intersections`, :meth:`distances`. All take positions and `stream`
-    as :meth:`detect` does, and raise the same errors. Calls from several threads wait for each other; only
-    :meth:`cancel` does not. A child process made by os.fork() cannot use a detector with more than one thread.
-    Detectors cannot be pickled.
+    Queries of one frame: :meth:`proximity`, :meth:`intersections`, :meth:`distances`, :meth:`winding_numbers`,
+    :meth:`signed_distances`. All take positions and `stream` as :meth:`detect` does, and raise the same errors. Calls
+    from several threads wait for each other; only :meth:`cancel` does not. A child process made by os.fork() cannot
+    use a detector with more than one thread. Detectors cannot be pickled.
 
     Examples
     --------
@@ -432,7 +435,11 @@ class Detector(
         return self._core.stats()
 
 
-for _part in (MotionQueries, SnapshotQueries):  # Python's own errors name functions: by the class that users know
+for _part in (
+    MotionQueries,
+    SnapshotQueries,
+    SolidQueries,
+):  # Python's own errors name functions: by the class that users know
     for _name, _function in vars(_part).items():
         if inspect.isfunction(_function):
             _function.__module__, _function.__qualname__ = __name__, f"Detector.{_name}"

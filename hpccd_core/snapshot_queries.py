@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import functools
-from typing import Any, Generic, NoReturn, cast
+from typing import Generic, NoReturn, cast
 
-from . import _core, arguments, device_arrays, device_results
+from . import arguments, device_results
 from .array_types import Positions, Stream
-from .mesh_layout import Indices, MeshLayout
+from .core_calls import SnapshotCalls
+from .mesh_layout import Indices
 from .options import Results
 from .proximity import Gap, Intersections, Proximity
 from .result_types import DistancesResult, IntersectionsResult, ProximityResult
@@ -17,15 +18,10 @@ from .results import INTERSECTION_ARRAYS, result_of, with_outputs
 _ONE_FRAME = "the positions of one frame; for a motion call detect(vertices_t0, vertices_t1)"
 
 
-class SnapshotQueries(Generic[ProximityResult, IntersectionsResult, DistancesResult]):
+class SnapshotQueries(SnapshotCalls, Generic[ProximityResult, IntersectionsResult, DistancesResult]):
     """Queries of positions at one time. Coordinates may be as large as 1e300."""
 
-    worlds: int | None
     results: Results
-    _shape: tuple[int, ...]  # of all positions
-    _rows: int
-    _core: _core.Detector
-    _layout: MeshLayout
     _outputs: tuple[str, ...]
 
     @arguments.hide_unnamed
@@ -119,12 +115,3 @@ class SnapshotQueries(Generic[ProximityResult, IntersectionsResult, DistancesRes
         faces: Indices = self._core.faces()
         faces.flags.writeable = False  # all results share it
         return faces
-
-    def _ask(self, query: str, vertices: object, stream: object, *more: float) -> Any:
-        made_on = device_arrays.stream_number(stream)
-        ask = getattr(self._core, query)
-        if device_arrays.is_on_device(vertices):
-            place = device_arrays.positions("vertices", vertices, self._shape, made_on)
-            return ask(place.for_core(self._rows), *more)
-        there = arguments.vertices("vertices", vertices, self._shape, self._layout)
-        return ask(device_arrays.on_host(there, made_on), *more)

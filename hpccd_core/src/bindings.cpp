@@ -13,6 +13,7 @@
 #include "gpu/device.h"
 #include "gpu/memory_on_device.h"
 #include "hpccd/hpccd.h"
+#include "solid/closed.h"
 
 namespace py = pybind11;
 using namespace hpccd;
@@ -428,6 +429,24 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
           },
           "vertices"_a)
       .def(
+          "winding_numbers",
+          [](Detector& d, const GivenPositions& vertices, const GivenPositions& points, std::uint32_t mesh) {
+            WindingNumbers w = unlocked([&] { return d.winding_numbers(vertices.positions, points.positions, mesh); });
+            return py::make_tuple(hand_over<std::int32_t>(std::move(w.numbers)),
+                                  hand_over<bool>(std::move(w.on_surface)));
+          },
+          "vertices"_a, "points"_a, "mesh"_a)
+      .def(
+          "signed_distances",
+          [](Detector& d, const GivenPositions& vertices, const GivenPositions& points, std::uint32_t mesh) {
+            SignedDistances s =
+                unlocked([&] { return d.signed_distances(vertices.positions, points.positions, mesh); });
+            return py::make_tuple(hand_over<double>(std::move(s.distance)),
+                                  hand_over<std::uint32_t>(std::move(s.faces)),
+                                  hand_over<double>(std::move(s.closest), 3));
+          },
+          "vertices"_a, "points"_a, "mesh"_a)
+      .def(
           "set_separation",
           [](Detector& d, std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {
             unlocked_if_busy(d, [&] { d.set_separation(mesh_a, mesh_b, separation); });
@@ -478,6 +497,14 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
         "minimum_separation"_a);
   m.def("test_edge_edge", &run_queries<&test_edge_edge>, "queries"_a, "accuracy"_a, "simd"_a, "minimum_separation"_a);
   m.def("widened", &widened, "array"_a);
+  m.def(
+      "is_closed",
+      [](const Array<std::uint32_t>& faces) {
+        using Face = std::array<std::uint32_t, 3>;
+        const std::span rows(reinterpret_cast<const Face*>(faces.data()), static_cast<std::size_t>(faces.size()) / 3);
+        return unlocked([&] { return !rows.empty() && !open_edge(rows); });
+      },
+      "faces"_a);
   py::class_<ArithmeticContext>(m, "StandardArithmetic")
       .def(py::init())
       .def("__enter__", [](ArithmeticContext& c) { c.entered.emplace(); })

@@ -18,6 +18,7 @@
 #include "contacts/outputs.h"
 #include "gpu/results_to_device.h"
 #include "prepared_impl.h"
+#include "solid/closed.h"
 
 namespace hpccd {
 namespace {
@@ -119,6 +120,46 @@ struct Detector::Impl {
       throw InvalidArgument("results_on_device: this detector leaves its results on the device; call " +
                             std::string(remedy) + "(), or make a detector without results_on_device");
   }
+
+  // Throws unless the points can be located with respect to the mesh.
+  void check_points(Positions points, std::uint32_t mesh) {
+    check_memory("points", points);
+    if (points.on_device && !takes_device_arrays)
+      throw InvalidArgument(
+          "points: are in a GPU's memory, which this detector does not use; copy them to the host, or choose the GPU "
+          "as backend");
+    if (points.n % options().worlds != 0)
+      throw InvalidArgument("points: each of the " + std::to_string(options().worlds) +
+                            " worlds must have the same number, but " + std::to_string(points.n) + " were given");
+    require_closed("mesh", mesh);
+  }
+
+  void require_closed(const char* name, std::uint32_t mesh) {
+    const std::vector<Scene::Mesh>& meshes = common.scene->meshes();
+    if (mesh >= meshes.size())
+      throw InvalidArgument(std::string(name) + ": the scene has no mesh " + std::to_string(mesh) + "; it has " +
+                            std::to_string(meshes.size()) + ", counted from 0");
+    const Scene::Mesh& m = meshes[mesh];
+    const std::string subject = std::string(name) + ": '" + m.name + "' ";
+    if (m.n_faces == 0) throw InvalidArgument(subject + "has no faces, and so no inside; give a closed mesh");
+    const auto& open = open_edge_of(mesh);
+    if (!open) return;
+    throw InvalidArgument(subject + "is not closed: the edge between its vertices " +
+                          std::to_string((*open)[0] - m.first_vertex) + " and " +
+                          std::to_string((*open)[1] - m.first_vertex) +
+                          " is not in exactly two faces of opposite direction; fill its holes, and merge doubled "
+                          "vertices");
+  }
+
+  // Found once for each mesh.
+  const std::optional<std::array<std::uint32_t, 2>>& open_edge_of(std::uint32_t mesh) {
+    const std::lock_guard lock(open_edges_lock);
+    if (const auto known = open_edges.find(mesh); known != open_edges.end()) return known->second;
+    const Scene::Mesh& m = common.scene->meshes()[mesh];
+    return open_edges[mesh] = open_edge(std::span(common.scene->faces()).subspan(m.first_face, m.n_faces));
+  }
+  std::mutex open_edges_lock;
+  std::map<std::uint32_t, std::optional<std::array<std::uint32_t, 2>>> open_edges;
 
   Backend pick(bool given_on_device) {
     const Backend wanted = options().backend;
@@ -325,6 +366,24 @@ Intersections Detector::intersections(Positions vertices) {
     found = {{"ef_intersections", hits->ef.size()}};
     impl_->add_places(*hits, v);
     return hits;
+  });
+}
+
+WindingNumbers Detector::winding_numbers(Positions vertices, Positions points, std::uint32_t mesh) {
+  const StandardArithmetic arithmetic;
+  impl_->check("vertices", vertices);
+  impl_->check_points(points, mesh);
+  return impl_->ask(vertices, points, [&](DetectionBackend& backend, Positions v, Positions p, Counts&) {
+    return backend.winding_numbers(v, p, mesh);
+  });
+}
+
+SignedDistances Detector::signed_distances(Positions vertices, Positions points, std::uint32_t mesh) {
+  const StandardArithmetic arithmetic;
+  impl_->check("vertices", vertices);
+  impl_->check_points(points, mesh);
+  return impl_->ask(vertices, points, [&](DetectionBackend& backend, Positions v, Positions p, Counts&) {
+    return backend.signed_distances(v, p, mesh);
   });
 }
 

@@ -75,6 +75,14 @@ class HPCCD_API Detector {
   /// several worlds, all pairs of the first world, then all pairs of the second, and so on.
   std::vector<Gap> distances(Positions vertices);
 
+  /// Winding numbers of points with respect to a mesh, exact at every accuracy. `points`: the same number for each
+  /// world, those of the first world first. Throws InvalidArgument if the mesh is unknown, has no faces or is not
+  /// closed: each edge of its faces must be in exactly two of them, in opposite directions.
+  WindingNumbers winding_numbers(Positions vertices, Positions points, std::uint32_t mesh);
+  /// Signed distances of points to a mesh. Signs are exact; distances have errors of at most 1e-12 of the largest
+  /// distance of the point from the mesh. Arguments and errors as winding_numbers.
+  SignedDistances signed_distances(Positions vertices, Positions points, std::uint32_t mesh);
+
   /// As detect, proximity and intersections, with results on the device. Throws InvalidArgument unless
   /// Options::results_on_device is set. If the device fails, the CPU computes the results and they are copied to the
   /// device; throws std::runtime_error if that fails too.

@@ -120,6 +120,21 @@ struct Gap {
   std::array<double, 3> normal{};   ///< zero at distance 0; see vertices
 };
 
+/// Winding numbers of points with respect to a closed mesh, exact.
+struct WindingNumbers {
+  /// 0 outside, +1 inside a mesh whose faces are counterclockwise seen from outside; 0 for points on the surface.
+  std::vector<std::int32_t> numbers;
+  std::vector<std::uint8_t> on_surface;  ///< 1 where a face contains the point, else 0
+};
+
+/// Signed distances of points to a closed mesh.
+struct SignedDistances {
+  /// Euclidean distance to the surface: negative where the winding number is not 0, 0 exactly on the surface.
+  std::vector<double> distance;
+  std::vector<std::uint32_t> faces;            ///< the nearest face; of several with the same distance the lowest
+  std::vector<std::array<double, 3>> closest;  ///< the nearest point on that face
+};
+
 /// Results in a GPU's memory, complete when the call returns. Rows and order are those of Contacts, Proximity and
 /// Intersections. Later calls do not write to the memory while `memory` is held; afterwards they reuse it. It may
 /// outlive the detector.

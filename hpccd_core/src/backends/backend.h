@@ -41,6 +41,9 @@ class DetectionBackend {
   virtual std::optional<Contacts> proximity(Positions, double) { return std::nullopt; }  // distances instead of times
   virtual std::optional<Intersections> intersections(Positions) { return std::nullopt; }
   virtual std::optional<std::vector<Gap>> distances(Positions) { return std::nullopt; }
+  // Of points and a closed mesh.
+  virtual std::optional<WindingNumbers> winding_numbers(Positions, Positions, std::uint32_t) { return std::nullopt; }
+  virtual std::optional<SignedDistances> signed_distances(Positions, Positions, std::uint32_t) { return std::nullopt; }
 
   // Adds the counts of the last step, and its stages on a device.
   virtual void count(std::map<std::string, std::uint64_t>& stats) const = 0;

@@ -9,6 +9,7 @@
 #include "contacts/intersections.h"
 #include "paper/primitive_pairs.h"
 #include "scene/edge_sample.h"
+#include "solid/points.h"
 #include "traverse/leaf_hulls.h"
 
 namespace hpccd {
@@ -275,6 +276,24 @@ std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
   shared_.profiler.mark("contacts");
   shared_.cancellation.heed();
   return gaps;
+}
+
+std::optional<WindingNumbers> CpuBackend::winding_numbers(Positions vertices, Positions points, std::uint32_t mesh) {
+  fit_snapshot(vertices);
+  WindingNumbers found = hpccd::winding_numbers({shared_.tree.tree(), shared_.tree.motion(), shared_.features, mesh},
+                                                points, shared_.pool);
+  shared_.profiler.mark("traverse");
+  shared_.cancellation.heed();
+  return found;
+}
+
+std::optional<SignedDistances> CpuBackend::signed_distances(Positions vertices, Positions points, std::uint32_t mesh) {
+  fit_snapshot(vertices);
+  SignedDistances found = hpccd::signed_distances({shared_.tree.tree(), shared_.tree.motion(), shared_.features, mesh},
+                                                  points, shared_.pool);
+  shared_.profiler.mark("traverse");
+  shared_.cancellation.heed();
+  return found;
 }
 
 // Pairs of features within a distance.

@@ -32,6 +32,8 @@ class CpuBackend final : public DetectionBackend {
   std::optional<Contacts> proximity(Positions vertices, double distance) override;
   std::optional<Intersections> intersections(Positions vertices) override;
   std::optional<std::vector<Gap>> distances(Positions vertices) override;
+  std::optional<WindingNumbers> winding_numbers(Positions vertices, Positions points, std::uint32_t mesh) override;
+  std::optional<SignedDistances> signed_distances(Positions vertices, Positions points, std::uint32_t mesh) override;
 
   // For several worlds: at the beginning of a call, and before and after each world. count() covers all worlds since
   // then.

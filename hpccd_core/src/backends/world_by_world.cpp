@@ -33,10 +33,20 @@ class FirstBadWorld {
   std::string why_;
 };
 
+template <class Row>
+void append(std::vector<Row>& all, const std::vector<Row>& more) {
+  all.insert(all.end(), more.begin(), more.end());
+}
+
 }  // namespace
 
 Positions WorldByWorld::of_world(Positions all, std::size_t world) const {
   return hpccd::of_world(all, shared_.features.n_vertices, world);
+}
+
+// Of points, of which each world has the same number.
+Positions WorldByWorld::points_of_world(Positions all, std::size_t world) const {
+  return hpccd::of_world(all, all.n / n_worlds(), world);
 }
 
 // True: each world has a result.
@@ -136,6 +146,30 @@ std::optional<std::vector<Gap>> WorldByWorld::distances(Positions vertices) {
   if (!complete) return std::nullopt;
   std::vector<Gap> all;
   for (const auto& gaps : found) all.insert(all.end(), gaps.begin(), gaps.end());
+  return all;
+}
+
+std::optional<WindingNumbers> WorldByWorld::winding_numbers(Positions vertices, Positions points, std::uint32_t mesh) {
+  std::vector<WindingNumbers> found;
+  const bool complete = answer(found, [&](DetectionBackend& backend, std::size_t world) {
+    return backend.winding_numbers(of_world(vertices, world), points_of_world(points, world), mesh);
+  });
+  if (!complete) return std::nullopt;
+  WindingNumbers all;
+  for (const WindingNumbers& w : found) append(all.numbers, w.numbers), append(all.on_surface, w.on_surface);
+  return all;
+}
+
+std::optional<SignedDistances> WorldByWorld::signed_distances(Positions vertices, Positions points,
+                                                              std::uint32_t mesh) {
+  std::vector<SignedDistances> found;
+  const bool complete = answer(found, [&](DetectionBackend& backend, std::size_t world) {
+    return backend.signed_distances(of_world(vertices, world), points_of_world(points, world), mesh);
+  });
+  if (!complete) return std::nullopt;
+  SignedDistances all;
+  for (const SignedDistances& w : found)
+    append(all.distance, w.distance), append(all.faces, w.faces), append(all.closest, w.closest);
   return all;
 }
 

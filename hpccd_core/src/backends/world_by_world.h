@@ -23,6 +23,8 @@ class WorldByWorld : public DetectionBackend {
   std::optional<Contacts> proximity(Positions vertices, double distance) final;
   std::optional<Intersections> intersections(Positions vertices) final;
   std::optional<std::vector<Gap>> distances(Positions vertices) final;
+  std::optional<WindingNumbers> winding_numbers(Positions vertices, Positions points, std::uint32_t mesh) final;
+  std::optional<SignedDistances> signed_distances(Positions vertices, Positions points, std::uint32_t mesh) final;
 
  protected:
   explicit WorldByWorld(Resources& shared) : shared_(shared) {}
@@ -39,6 +41,7 @@ class WorldByWorld : public DetectionBackend {
   template <class Answer, class Query>
   bool answer(std::vector<Answer>& answers, Query&& query);
   Positions of_world(Positions all, std::size_t world) const;
+  Positions points_of_world(Positions all, std::size_t world) const;
 
   // Kept after a cancelled call: returning the memory of 10 million contacts to the system takes longer than ending the
   // call.

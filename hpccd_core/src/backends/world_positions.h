@@ -19,7 +19,7 @@ inline Positions of_world(Positions all, std::size_t n_vertices, std::size_t wor
 
 // "vertices_t1[17, 2] is NaN" of world 3 is vertices_t1[3, 17, 2].
 inline std::string with_world(std::string text, std::size_t world) {
-  for (const char* name : {"vertices_t0[", "vertices_t1[", "vertices["})
+  for (const char* name : {"vertices_t0[", "vertices_t1[", "vertices[", "points["})
     if (const std::size_t at = text.find(name); at != std::string::npos)
       return text.insert(at + std::string(name).size(), std::to_string(world) + ", ");
   return "world " + std::to_string(world) + ": " + text;

@@ -2,7 +2,6 @@
 #include "bvh/motion_bounds.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -11,6 +10,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "bvh/bad_coordinate.h"
 #include "scene/edge_sample.h"
 
 namespace hpccd {
@@ -18,9 +18,6 @@ namespace {
 
 // With ten pieces of 1024 vertices, one of four threads would get three, a fifth more than its share.
 constexpr std::size_t grain = 256;
-
-// False for NaN.
-bool acceptable(double x, double largest) { return std::fabs(x) <= largest; }
 
 template <class Real>
 Extent extent_of(const Real* x, std::size_t begin, std::size_t end, double largest) {
@@ -33,27 +30,6 @@ Extent extent_of(const Real* x, std::size_t begin, std::size_t end, double large
       e.high[k] = std::max(e.high[k], value);
     }
   return e;
-}
-
-// The shortest decimal that identifies it: 1e+200, not two hundred zeros.
-std::string shortest(double x) {
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, x).ptr};
-}
-
-template <class Real>
-[[noreturn]] void report_bad(const char* name, const Real* x, std::size_t n, double largest) {
-  for (std::size_t i = 0; i < n; ++i)
-    for (int k = 0; k < 3; ++k) {
-      const double value = x[3 * i + k];
-      if (acceptable(value, largest)) continue;
-      const std::string where = std::string(name) + "[" + std::to_string(i) + ", " + std::to_string(k) + "] is ";
-      if (!std::isfinite(value))
-        throw InvalidArgument(where + (std::isnan(value) ? "NaN" : "infinite") + "; all coordinates must be finite");
-      throw InvalidArgument(where + shortest(value) + ", beyond " + shortest(largest) +
-                            ": intermediate results could overflow; scale the scene down");
-    }
-  throw InvalidArgument(std::string(name) + " changed while it was being read");
 }
 
 // box_map(x, k): coordinate k of a box. of_any_part: see MotionBounds; for grown boxes.

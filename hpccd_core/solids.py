@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Closed meshes: what makes a mesh closed, and signed distances from one."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _core, arguments
+from .array_types import ArrayLike
+from .mesh_layout import Indices
+
+
+def closed(faces: ArrayLike) -> bool:
+    """Whether a mesh is closed: each edge is in exactly two faces, which name its vertices in opposite orders.
+
+    Parameters
+    ----------
+    faces : ArrayLike, shape (F, 3), integers
+        As for :meth:`Scene.add_mesh`. A face that names a vertex twice does not count.
+
+    Returns
+    -------
+    bool
+        False without faces.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `faces` has the wrong type or shape.
+
+    Notes
+    -----
+    It depends on the faces alone. Two vertices at the same position are two vertices: files that list the corners of
+    each triangle have no closed meshes.
+
+    Examples
+    --------
+    >>> import hpccd_core as hc
+    >>> vertices, faces = hc.shapes.icosphere(2)
+    >>> hc.closed(faces), hc.closed(faces[1:])
+    (True, False)
+    """
+    return _core.is_closed(arguments.faces(faces))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SignedDistances:
+    """Signed distances of K points to a closed mesh, made by :meth:`Detector.signed_distances`.
+
+    With worlds, arrays have W as their first axis.
+
+    Attributes
+    ----------
+    distance : ndarray, shape (K,), float64
+        Euclidean distance to the surface, in the unit of the coordinates: negative where the winding number is not 0,
+        and 0 exactly where the point is on the surface.
+    faces : ndarray, shape (K,), uint32
+        Scene-wide indices of the nearest faces, as in ``contacts.vf[:, 1]``; see :meth:`Scene.locate`. Of several
+        faces at the same distance, the lowest.
+    closest : ndarray, shape (K, 3), float64
+        The nearest point on that face.
+    """
+
+    distance: NDArray[np.float64]
+    faces: Indices
+    closest: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        inside: Any = np.count_nonzero(self.distance < 0)
+        return f"SignedDistances({self.distance.size} points, {inside} inside)"

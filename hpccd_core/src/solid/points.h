@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+// Queries of many points and one closed mesh. Points are processed along a space-filling curve, so that neighbours read
+// the same nodes and faces, and each begins with what the one before has found.
+#pragma once
+
+#include "base/parallel.h"
+#include "solid/mesh_in_tree.h"
+
+namespace hpccd {
+
+// Throw InvalidArgument for a coordinate that is not finite or beyond largest_in_snapshot, and Cancelled.
+WindingNumbers winding_numbers(const MeshInTree& mesh, Positions points, ThreadPool& pool);
+SignedDistances signed_distances(const MeshInTree& mesh, Positions points, ThreadPool& pool);
+
+}  // namespace hpccd
