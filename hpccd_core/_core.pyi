@@ -137,6 +137,7 @@ _Gap = tuple[
     NDArray[np.uint32],
     NDArray[np.float64],
     NDArray[np.float64],
+    str | None,
 ]
 
 class Positions:

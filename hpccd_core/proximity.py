@@ -18,6 +18,7 @@ from .results import INTERSECTION_ARRAYS, WithSides, output
 from .worlds import ComparedByRows, OfWorlds, PairsOfWorlds, Slices
 
 Kind = Literal["vertex-face", "edge-edge", "edge-face", ""]
+Inside = Literal["a", "b", "both"]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -318,7 +319,8 @@ class Gap(ComparedByRows):
     mesh_a, mesh_b : str
         Names; `mesh_a` was added before `mesh_b`, or is the same.
     distance : float
-        Euclidean, in the unit of the coordinates; 0 if they touch or intersect, +inf if no pair of features exists.
+        Euclidean, of the surfaces, in the unit of the coordinates; 0 if they touch or intersect, +inf if no pair of
+        features exists.
     kind : str
         "vertex-face", "edge-edge", "edge-face" (they intersect) or "" (no pair exists).
     features : tuple of int
@@ -333,6 +335,20 @@ class Gap(ComparedByRows):
     normal : ndarray, shape (3,), float64
         As a row of Proximity.normals, or shape (0,). The derivative of `distance` with respect to the position of
         vertex i is weights[i] times the normal.
+    inside : {"a", "b", "both"} or None
+        "a" if a connected component of `mesh_a` lies inside `mesh_b` without touching it, "b" for the reverse. A
+        component is what shared vertices connect: faces, edges, or a single vertex. Exact; decided where `distance` is
+        above 0, otherwise None; None within a mesh. Only closed meshes contain anything (:func:`hpccd_core.closed`):
+        what their faces wind around, whichever way they are oriented.
+
+    Examples
+    --------
+    >>> import hpccd_core as hc
+    >>> scene, (vertices, faces) = hc.Scene(), hc.shapes.box((1.0, 1.0, 1.0))
+    >>> numbers = scene.add_mesh("inner", faces), scene.add_mesh("outer", faces)
+    >>> gap = hc.Detector(scene).distances({"inner": vertices, "outer": 4 * vertices})[1]
+    >>> gap.distance, gap.inside
+    (1.5, 'a')
     """
 
     mesh_a: str
@@ -344,3 +360,4 @@ class Gap(ComparedByRows):
     vertices: Indices = dataclasses.field(default_factory=lambda: np.empty(0, np.uint32))
     weights: NDArray[np.float64] = dataclasses.field(default_factory=lambda: np.empty(0))
     normal: NDArray[np.float64] = dataclasses.field(default_factory=lambda: np.empty(0))
+    inside: Inside | None = None

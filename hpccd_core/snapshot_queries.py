@@ -80,7 +80,7 @@ class SnapshotQueries(SnapshotCalls, Generic[ProximityResult, IntersectionsResul
 
     @arguments.hide_unnamed
     def distances(self, vertices: Positions, *unnamed: NoReturn, stream: Stream = None) -> DistancesResult:
-        """The smallest distance of each pair of meshes that the scene enables, within a mesh too.
+        """The smallest distance of each two meshes that the scene enables, within a mesh too, and which lies inside.
 
         Parameters
         ----------
@@ -102,8 +102,8 @@ class SnapshotQueries(SnapshotCalls, Generic[ProximityResult, IntersectionsResul
             arguments.reject_unnamed("distances", _ONE_FRAME)
         names = self._layout.mesh_names
         gaps = [
-            Gap(names[a], names[b], distance, kind, tuple(features), *arrays)
-            for a, b, distance, kind, features, *arrays in self._ask("distances", vertices, stream)
+            Gap(names[a], names[b], distance, kind, tuple(features), *others)
+            for a, b, distance, kind, features, *others in self._ask("distances", vertices, stream)
         ]
         if self.worlds is None:
             return cast(DistancesResult, gaps)

@@ -171,7 +171,21 @@ std::size_t n_features(GapKind kind) {
   return kind == GapKind::none ? 0 : kind == GapKind::vertex_face ? 2 : kind == GapKind::edge_edge ? 4 : 3;
 }
 
-// (mesh_a, mesh_b, distance, kind, features, points, vertices, weights, normal) of each gap.
+const char* name_of(Inside inside) {
+  switch (inside) {
+    case Inside::a:
+      return "a";
+    case Inside::b:
+      return "b";
+    case Inside::both:
+      return "both";
+    case Inside::none:
+      break;
+  }
+  return nullptr;  // None
+}
+
+// (mesh_a, mesh_b, distance, kind, features, points, vertices, weights, normal, inside) of each gap.
 py::list to_list(const std::vector<Gap>& gaps) {
   py::list l;
   for (const Gap& g : gaps) {
@@ -184,7 +198,7 @@ py::list to_list(const std::vector<Gap>& gaps) {
     };
     l.append(py::make_tuple(g.mesh_a, g.mesh_b, g.distance, name_of(g.kind),
                             std::vector<std::uint32_t>(features.begin(), features.end()), points, rows(g.vertices),
-                            rows(g.weights), rows(g.normal)));
+                            rows(g.weights), rows(g.normal), name_of(g.inside)));
   }
   return l;
 }

@@ -11,6 +11,7 @@ from fuzz import differential, questions, slowest
 from fuzz.generators import GENERATORS, VERTEX_FACE
 from fuzz.questions import (
     CONTACT,
+    CONTAINMENT,
     DEPTH,
     DISTANCES,
     INTERSECTIONS,
@@ -39,6 +40,8 @@ def n_batches(question):
         (PROXIMITY, 40, 1),
         (INTERSECTIONS, 60, 1),
         (DISTANCES, 60, 1),
+        (CONTAINMENT, 600, 1),
+        pytest.param(CONTAINMENT, 2000, 2, marks=pytest.mark.long),
         (STEP, 25, 2),
         (MOTION, 20, 1),
         (POINTS, 60, 1),
@@ -117,6 +120,19 @@ def test_wrong_distances_of_meshes_are_seen_saved_and_replayed(mistake, tmp_path
         assert command.main([*arguments, "--save", str(saved)]) == 1
     with np.load(saved) as file:
         assert {key.split("|")[1] for key in file.files} == {"exact", "conservative"}
+    assert command.main(["--replay", str(saved), "--accuracy", "exact", "--save", str(tmp_path / "again.npz")]) == 0
+
+
+@pytest.mark.parametrize("side", [None, "a", "both"])
+def test_wrong_containment_is_seen_saved_and_replayed(side, tmp_path, monkeypatch, capsys):
+    def wrong(self, points):
+        return [dataclasses.replace(gap, inside=side) for gap in super(hc.Detector, self).distances(points)]
+
+    saved = tmp_path / "failures.npz"
+    with monkeypatch.context() as patch:
+        patch.setattr(hc.Detector, "distances", wrong)
+        arguments = ["--count", "60", "--batch", "200", "--accuracy", "exact", "--question", CONTAINMENT]
+        assert command.main([*arguments, "--save", str(saved)]) == 1
     assert command.main(["--replay", str(saved), "--accuracy", "exact", "--save", str(tmp_path / "again.npz")]) == 0
 
 

@@ -15,6 +15,7 @@ from . import questions, solids
 from .motions import break_promises
 from .questions import (
     CONTACT,
+    CONTAINMENT,
     DEPTH,
     DISTANCES,
     INTERSECTIONS,
@@ -33,7 +34,7 @@ from .steps import EARLY, contradict
 
 SIMD = ("scalar", "avx2", "avx512", "neon")
 QUESTIONS = (CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS, DISTANCES, STEP, MOTION)
-QUESTIONS += (POINTS,)
+QUESTIONS += (CONTAINMENT, POINTS)
 
 # Guarantee of `exact`: error of the time; error of the distance, relative to the size of the query.
 TOLERANCE = 1e-12
@@ -133,7 +134,7 @@ def compare(batch: Batch, accuracy: str, simd: Sequence[str], truth: Results) ->
     (hit, value), *others = (questions.results(batch, accuracy, s) for s in simd)
     # A distance of meshes is told whether or not they touch; it is infinite where they have no pair of features.
     # A step is told where nothing touches too, and a smallest factor.
-    always = batch.question in (DISTANCES, STEP, MOTION, WINDING, SIGNED, TRANSLATION, DEPTH, POINTS)
+    always = batch.question in (DISTANCES, CONTAINMENT, STEP, MOTION, WINDING, SIGNED, TRANSLATION, DEPTH, POINTS)
     told = np.ones_like(hit) if always else hit
     largest = 1.0 if batch.question in (CONTACT, SEPARATION, STEP, MOTION) else np.inf
     if not ((value[told] >= 0) & (value[told] <= largest)).all():

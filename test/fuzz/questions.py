@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Queries to the core and the oracle: contact, separation, proximity and intersections of single pairs; distances,
-collision-free steps, collision-free motions, winding numbers, separating translations and penetration of
+containment, collision-free steps, collision-free motions, winding numbers, separating translations and penetration of
 small scenes."""
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import oracle
 
 import hpccd_core as hc
 
+from .containment import CONTAINMENT_KINDS, CONTAINMENT_POINTS, core_containment, true_containment
 from .disturbances import disturb, disturb_near
 from .gaps import GAP_POINTS, TOPOLOGIES, core_gaps, true_gaps
 from .generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
@@ -37,11 +38,12 @@ from .steps import STEP_MOTIONS, core_steps, true_steps
 
 CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS = "contact", "separation", "proximity", "intersections"
 DISTANCES, STEP, MOTION = "distances", "step", "motion"
-WINDING, SIGNED = "winding", "signed-distance"
+CONTAINMENT, WINDING, SIGNED = "containment", "winding", "signed-distance"
 TRANSLATION, DEPTH, POINTS = "translation", "depth", "points"
 # By question, their kinds.
 OF_SCENES = {
     DISTANCES: TOPOLOGIES,
+    CONTAINMENT: CONTAINMENT_KINDS,
     STEP: STEP_MOTIONS,
     MOTION: FREE_MOTIONS,
     TRANSLATION: TRANSLATIONS,
@@ -50,6 +52,7 @@ OF_SCENES = {
 PAIRS_OF_A_SCENE = 10  # a batch has a tenth as many scenes as single pairs: each scene has dozens of pairs
 
 OF_SOLIDS = {
+    CONTAINMENT: (true_containment, core_containment),
     WINDING: (true_windings, core_windings),
     SIGNED: (true_signed_distances, core_signed_distances),
     TRANSLATION: (true_translations, core_translations),
@@ -91,6 +94,7 @@ def generators_of(question: str, kind: str) -> dict[str, Callable]:
         DISTANCES: dict.fromkeys(TOPOLOGIES, GAP_POINTS),
         STEP: STEP_MOTIONS,
         MOTION: FREE_MOTIONS,
+        CONTAINMENT: CONTAINMENT_POINTS,
         WINDING: WINDING_POINTS,
         SIGNED: WINDING_POINTS,
         TRANSLATION: TRANSLATIONS,

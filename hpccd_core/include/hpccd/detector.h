@@ -70,9 +70,9 @@ class HPCCD_API Detector {
   Proximity proximity(Positions vertices, double distance);
   /// Edges and faces that share a point but no vertex, coplanar pairs included.
   Intersections intersections(Positions vertices);
-  /// The smallest distance of each enabled pair of meshes, sorted by (mesh_a, mesh_b), with mesh_a <= mesh_b. Of
-  /// several pairs of features with the same distance (as a double), the first in canonical order is returned. For
-  /// several worlds, all pairs of the first world, then all pairs of the second, and so on.
+  /// The smallest distance of each enabled pair of meshes, sorted by (mesh_a, mesh_b), with mesh_a <= mesh_b, and
+  /// whether one lies inside the other. Of several pairs of features with the same distance (as a double), the first in
+  /// canonical order is returned. For several worlds, all pairs of the first world, then all of the second, and so on.
   std::vector<Gap> distances(Positions vertices);
 
   /// Winding numbers of points with respect to a mesh, exact at every accuracy. `points`: the same number for each

@@ -105,19 +105,27 @@ struct Intersections {
 
 /// The kind of the closest pair of features. none: no pair exists. edge_face: the meshes intersect.
 enum class GapKind : std::uint8_t { none, vertex_face, edge_edge, edge_face };
-/// The smallest distance of two meshes in one frame.
+/// Which of the two meshes of a gap lies inside the other.
+enum class Inside : std::uint8_t { none, a, b, both };
+/// The smallest distance of two meshes in one frame, and whether one lies inside the other.
 struct Gap {
-  std::uint32_t mesh_a;                                       ///< number of the first mesh
-  std::uint32_t mesh_b;                                       ///< number of the second mesh, >= mesh_a
-  double distance = std::numeric_limits<double>::infinity();  ///< 0 for edge_face, infinite for none
-  GapKind kind = GapKind::none;                               ///< kind of the closest pair of features
-  std::array<std::uint32_t, 4> features{};                    ///< as in vf, ee or ef, then zeros
-  std::array<std::array<double, 3>, 2> points{};              ///< the nearest points of both meshes
+  std::uint32_t mesh_a;  ///< number of the first mesh
+  std::uint32_t mesh_b;  ///< number of the second mesh, >= mesh_a
+  /// Of the surfaces, also if one mesh lies inside the other; 0 for edge_face, infinite for none.
+  double distance = std::numeric_limits<double>::infinity();
+  GapKind kind = GapKind::none;                   ///< kind of the closest pair of features
+  std::array<std::uint32_t, 4> features{};        ///< as in vf, ee or ef, then zeros
+  std::array<std::array<double, 3>, 2> points{};  ///< the nearest points of both meshes
   /// As in Proximity, of the closest pair; zero for edge_face and none. The derivative of the distance with respect to
   /// the position of vertices[i] is weights[i] times the normal.
   std::array<std::uint32_t, 4> vertices{};
   std::array<double, 4> weights{};  ///< see vertices
   std::array<double, 3> normal{};   ///< zero at distance 0; see vertices
+  /// a: a connected component of mesh_a (features joined by shared vertices: of faces, edges or a single vertex) lies
+  /// inside mesh_b without touching it: the winding number of mesh_b around it is not 0. Decided exactly where distance
+  /// is > 0, otherwise none; none within a mesh. Only closed meshes contain anything: each edge of their faces is in
+  /// exactly two of them, in opposite directions.
+  Inside inside = Inside::none;
 };
 
 /// Winding numbers of points with respect to a closed mesh, exact.

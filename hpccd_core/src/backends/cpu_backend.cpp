@@ -221,6 +221,7 @@ void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
   std::uint64_t bytes = order_.bytes() + near_.bytes() + drift_.bytes();
   if (method_) bytes += method_->bytes();
   if (mesh_pairs_) bytes += mesh_pairs_->bytes();
+  if (containment_) bytes += containment_->bytes() + contained_.bytes();
   for (const Worker& w : workers_) bytes += sizeof(Worker) + w.bytes();
   stats["bytes"] += bytes;
   if (counts_of_worlds_) return counts_of_worlds_->write(stats);
@@ -234,11 +235,13 @@ void CpuBackend::begin_world(WorldMemory& memory, TreeBudget& trees) {
   // Any of several contacts may be returned, but it must be the one that a detector of this world alone returns.
   shared_.tree.begin_world(memory.tree, trees, shared_.options.report == Report::any);
   std::swap(near_, memory.near);
+  std::swap(contained_, memory.containment);
 }
 
 void CpuBackend::end_world(WorldMemory& memory) {
   *counts_of_worlds_ += last_counts();
   std::swap(near_, memory.near);
+  std::swap(contained_, memory.containment);
   shared_.tree.end_world();
 }
 
@@ -267,6 +270,7 @@ std::optional<Intersections> CpuBackend::intersections(Positions vertices) {
 std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
   fit_snapshot(vertices);
   if (!mesh_pairs_) mesh_pairs_.emplace(shared_.rules, shared_.scene->meshes().size());
+  if (!containment_) containment_.emplace(*shared_.scene, shared_.features, *mesh_pairs_);
   NearestPairs nearest(*mesh_pairs_, shared_.features, shared_.tree.motion(), shared_.tree.tree());
   DistanceSearch search(shared_.tree.tree(), shared_.rules, shared_.options.simd, nearest);
   begin(search);
@@ -274,6 +278,8 @@ std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
   walk_tree(search);
   std::vector<Gap> gaps = collect_gaps(nearest, search.geometry, shared_.cancellation);
   shared_.profiler.mark("contacts");
+  containment_->decide(gaps, shared_.tree.tree(), shared_.tree.motion(), contained_, shared_.pool);
+  shared_.profiler.mark("containment");
   shared_.cancellation.heed();
   return gaps;
 }

@@ -14,6 +14,7 @@
 #include "backends/world_memory.h"
 #include "contacts/canonical.h"
 #include "paper/method.h"
+#include "solid/containment.h"
 #include "traverse/worker.h"
 
 namespace hpccd {
@@ -102,7 +103,10 @@ class CpuBackend final : public DetectionBackend {
   };
   std::unique_ptr<WholeWays> whole_;
   std::vector<Shortening::Touching> touching_;
-  std::optional<MeshPairs> mesh_pairs_;  // created by the first search for smallest distances
+  // Created by the first search for smallest distances.
+  std::optional<MeshPairs> mesh_pairs_;
+  std::optional<Containment> containment_;
+  ContainmentMemory contained_;
   // The start of the drift: the numbers of that snapshot and of the tree.
   std::optional<std::pair<std::uint64_t, std::uint64_t>> drift_of_;
   // Kept after a cancelled call: returning the memory of 10 million contacts to the system takes longer than ending the

@@ -4,15 +4,19 @@
 
 #include "backends/moving_tree.h"
 #include "backends/near_list.h"
+#include "solid/containment.h"
 
 namespace hpccd {
 
 struct WorldMemory {
   OwnTree tree;
   NearList near;
+  ContainmentMemory containment;
   double seconds = 0;  // time of its last call
 
-  std::size_t bytes() const { return sizeof *this + near.bytes() + (tree.kept ? tree.kept->tree.bytes() : 0); }
+  std::size_t bytes() const {
+    return sizeof *this + near.bytes() + containment.bytes() + (tree.kept ? tree.kept->tree.bytes() : 0);
+  }
 };
 
 }  // namespace hpccd

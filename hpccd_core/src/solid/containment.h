@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which meshes lie inside others, in snapshots of one scene. Where the surfaces of two meshes do not touch, all points
+// of a connected component of one have the same winding number with respect to the other: one vertex decides.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "base/parallel.h"
+#include "bvh/motion_bounds.h"
+#include "bvh/tree.h"
+#include "hpccd/results.h"
+#include "solid/outside_list.h"
+#include "traverse/mesh_pairs.h"
+
+namespace hpccd {
+
+// What the decisions of one world leave for its next snapshot. It affects only how much is computed: each result is
+// that of a new detector.
+struct ContainmentMemory {
+  struct OfPair {
+    std::uint32_t found = Tree::none;      // the vertex that was inside last
+    std::unique_ptr<OutsideList> outside;  // made when many vertices were outside
+    int rests = 0;                         // snapshots until another list may be made
+  };
+  // By twice the number of the pair of meshes, plus 1 if the second one may be inside.
+  std::unordered_map<std::size_t, OfPair> of_pair;
+
+  std::size_t bytes() const;
+};
+
+class Containment {
+ public:
+  // The arguments must outlive the object.
+  Containment(const Scene& scene, const Features& features, const MeshPairs& pairs);
+
+  // Sets Gap::inside of each pair of meshes, in the order of the pairs. The tree is that of the snapshot. Throws
+  // Cancelled.
+  void decide(std::span<Gap> gaps, const Tree& tree, const MotionBounds& snapshot, ContainmentMemory& memory,
+              ThreadPool& pool) const;
+
+  std::size_t bytes() const { return closed_.capacity() + 4 * (first_.capacity() + vertices_.capacity()); }
+
+ private:
+  struct Question;
+  std::span<const std::uint32_t> components(std::uint32_t mesh) const {
+    return {vertices_.data() + first_[mesh], vertices_.data() + first_[mesh + 1]};
+  }
+  std::deque<Question> questions_of(std::span<Gap> gaps, const MotionBounds& snapshot) const;
+  void remember(const Question& question, const Tree& tree, const MotionBounds& snapshot,
+                ContainmentMemory::OfPair& memory, ThreadPool& pool) const;
+
+  const Scene& scene_;
+  const Features& features_;
+  const MeshPairs& pairs_;
+  std::vector<char> closed_;                     // by mesh
+  std::vector<std::uint32_t> first_, vertices_;  // by mesh, one vertex of each connected component
+};
+
+}  // namespace hpccd
