@@ -19,7 +19,9 @@ from fuzz.questions import (
     POINTS,
     PROXIMITY,
     SEPARATION,
+    SIGNED,
     STEP,
+    WINDING,
 )
 
 import hpccd_core as hc
@@ -44,6 +46,8 @@ def n_batches(question):
         pytest.param(CONTAINMENT, 2000, 2, marks=pytest.mark.long),
         (STEP, 25, 2),
         (MOTION, 20, 1),
+        (WINDING, 150, 1),
+        (SIGNED, 50, 1),
         (POINTS, 60, 1),
         pytest.param(STEP, 60, 2, marks=pytest.mark.long),
         pytest.param(MOTION, 100, 4, marks=pytest.mark.long),
@@ -239,6 +243,22 @@ def test_wrong_motions_are_seen_saved_and_replayed(mistake, tmp_path, monkeypatc
     assert command.main(["--replay", str(saved), "--accuracy", "exact", "--save", str(tmp_path / "again.npz")]) == 0
 
 
+def one_more(found):
+    return found[0] + 1, found[1]
+
+
+def beside_the_surface(found):
+    return found[0], np.zeros_like(found[1])
+
+
+def beyond(found):
+    return dataclasses.replace(found, distance=found.distance * (1 + 1e-9))
+
+
+def in_other_faces(found):
+    return dataclasses.replace(found, faces=np.roll(found.faces, 1))
+
+
 def later(found):
     return dataclasses.replace(found, outputs={**found.outputs, "edge_parameters": found.edge_parameters + 1e-9})
 
@@ -246,6 +266,10 @@ def later(found):
 @pytest.mark.parametrize(
     ("question", "method", "mistake"),
     [
+        (WINDING, "winding_numbers", one_more),
+        (WINDING, "winding_numbers", beside_the_surface),
+        (SIGNED, "signed_distances", beyond),
+        (SIGNED, "signed_distances", in_other_faces),
         (POINTS, "intersections", later),
     ],
 )

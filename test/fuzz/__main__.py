@@ -68,9 +68,10 @@ def _parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="python -m fuzz",
         description="Compare contact, separation, proximity and intersections of single pairs, and of small scenes the "
-        "smallest distances of their meshes, which lie inside which, how far they may go and their collision-free "
-        "motions, with the exact oracle on degenerate queries. Exit status 1 where exact differs (time or distance: by "
-        "more than 1e-12), where "
+        "smallest distances of their meshes, which lie inside which, how far they may go, their collision-free "
+        "motions, winding numbers and signed distances of points, separating translations and penetration depth, with "
+        "the exact oracle on degenerate queries. Exit status 1 where exact differs (time or distance: by more than "
+        "1e-12), where a depth is below the true one or a translation does not separate, where "
         "conservative misses a pair, reports it late or, where distances count, differs in the same way, where either "
         "lets a scene go too far or ends it more than 1e-9 too early, where a collision-free motion touches anything "
         "or keeps less than promised, where report='first' is not the earliest contacts of 'all', or where an "
