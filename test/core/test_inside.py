@@ -201,6 +201,25 @@ def test_threads_and_worlds_change_nothing():
         assert all(np.array_equal(getattr(one, x), getattr(signed, x)[k]) for x in ("distance", "faces", "closest"))
 
 
+def test_results_are_those_of_one_thread():
+    rng = np.random.default_rng(13)
+    vertices, faces = hc.shapes.icosphere(20)
+    points = rng.uniform(-1.2, 1.2, (20000, 3))
+    one, several = (detector((vertices, faces), threads=n) for n in (1, 3))
+    for query in ("winding_numbers", "signed_distances"):
+        a, b = (getattr(d, query)(vertices, points, 0) for d in (one, several))
+        rows = (a, b) if query == "winding_numbers" else (vars(a).values(), vars(b).values())
+        assert all(np.array_equal(x, y) for x, y in zip(*rows, strict=True))
+
+
+def test_cancelled_queries_end():
+    vertices, faces = hc.shapes.icosphere(8)
+    cancelled = detector((vertices, faces))
+    cancelled.cancel()
+    with pytest.raises(hc.Cancelled):
+        cancelled.signed_distances(vertices, vertices, 0)
+
+
 def check_signed(vertices, faces, points, within=1e-12):
     signed = detector((vertices, faces)).signed_distances(vertices, points, 0)
     numbers, on_surface = expected_windings(vertices, faces, points)
