@@ -539,7 +539,7 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
          const Array<std::int64_t>& first_vertex) {
         const IntersectionRows rows = rows_of(ef, incidences, faces, first_vertex);
         py::list l;
-        for (Contour& c : unlocked([&] { return contours(rows); }))
+        for (Contour& c : unlocked([&] { return contours_of(rows); }))
           l.append(py::make_tuple(hand_over<std::uint32_t>(std::move(c.rows)), c.closed, c.mesh_a, c.mesh_b));
         return l;
       },
@@ -551,7 +551,7 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
          const Array<std::int64_t>& first_vertex) {
         const IntersectionRows rows = rows_of(ef, incidences, faces, first_vertex);
         py::list l;
-        for (EnclosedRegion& r : unlocked([&] { return enclosed_regions(rows); }))
+        for (EnclosedRegion& r : unlocked([&] { return enclosed_regions_of(rows); }))
           l.append(py::make_tuple(hand_over<std::uint32_t>(std::move(r.vertices_a)),
                                   hand_over<std::uint32_t>(std::move(r.vertices_b))));
         return l;

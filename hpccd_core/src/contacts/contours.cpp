@@ -482,7 +482,7 @@ struct Traced {
 
 }  // namespace
 
-std::vector<Contour> contours(const IntersectionRows& rows) {
+std::vector<Contour> contours_of(const IntersectionRows& rows) {
   check_rows(rows);
   if (rows.ef.empty()) return {};
   const Traced traced(rows);
@@ -498,7 +498,7 @@ std::vector<Contour> contours(const IntersectionRows& rows) {
   return found;
 }
 
-std::vector<EnclosedRegion> enclosed_regions(const IntersectionRows& rows) {
+std::vector<EnclosedRegion> enclosed_regions_of(const IntersectionRows& rows) {
   check_rows(rows);
   if (rows.ef.empty()) return {};
   const Traced traced(rows);
@@ -515,12 +515,13 @@ std::vector<EnclosedRegion> enclosed_regions(const IntersectionRows& rows) {
   return found;
 }
 
-std::vector<Contour> contours(const Scene& scene, const Intersections& found) {
-  return contours(CheckedRows(scene, found).rows);
-}
-
-std::vector<EnclosedRegion> enclosed_regions(const Scene& scene, const Intersections& found) {
-  return enclosed_regions(CheckedRows(scene, found).rows);
-}
-
 }  // namespace hpccd
+
+// Outside of the namespace: inside, a declaration of the inline namespace would be declared again.
+std::vector<hpccd::Contour> hpccd::contours(const Scene& scene, const Intersections& found) {
+  return contours_of(CheckedRows(scene, found).rows);
+}
+
+std::vector<hpccd::EnclosedRegion> hpccd::enclosed_regions(const Scene& scene, const Intersections& found) {
+  return enclosed_regions_of(CheckedRows(scene, found).rows);
+}

@@ -17,7 +17,7 @@ struct IntersectionRows {
 };
 
 // As the functions of hpccd/contours.h.
-std::vector<Contour> contours(const IntersectionRows& rows);
-std::vector<EnclosedRegion> enclosed_regions(const IntersectionRows& rows);
+std::vector<Contour> contours_of(const IntersectionRows& rows);
+std::vector<EnclosedRegion> enclosed_regions_of(const IntersectionRows& rows);
 
 }  // namespace hpccd
