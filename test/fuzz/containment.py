@@ -190,22 +190,21 @@ def true_containment(name: str, queries: np.ndarray, threads: int = 0) -> tuple[
 
 def _true_of_scene(kind: Kind, points: np.ndarray, threads: int) -> list[bool]:
     starts = np.cumsum([0, *kind.n_vertices])
-    touching = _touching(kind, points, threads)
-    hits = []
-    for a, b in itertools.combinations(range(len(kind.meshes)), 2):
-        for inner, outer in ((a, b), (b, a)):
-            hit = False
-            if (a, b) not in touching and kind.closed(outer):
-                ends = starts[inner] + np.cumsum([len(part.vertices) for part in kind.meshes[inner]])
-                surface = points[starts[outer] :][: kind.n_vertices[outer]], kind.faces(outer)
-                numbers, on_surface = oracle.winding_numbers(surface, points[ends - 1], threads)  # one of each part
-                assert not on_surface.any()
-                hit = numbers.any()
-            hits.append(bool(hit))
-    return hits
+    pairs = list(itertools.combinations(range(len(kind.meshes)), 2))
+    around = {}  # by (inner, outer): whether the winding number around a part is not 0
+    for inner, outer in [*pairs, *((b, a) for a, b in pairs)]:
+        around[inner, outer] = False
+        if kind.closed(outer):
+            ends = starts[inner] + np.cumsum([len(part.vertices) for part in kind.meshes[inner]])
+            surface = points[starts[outer] :][: kind.n_vertices[outer]], kind.faces(outer)
+            numbers, _ = oracle.winding_numbers(surface, points[ends - 1], threads)  # one of each part
+            around[inner, outer] = bool(numbers.any())
+    candidates = [(a, b) for a, b in pairs if around[a, b] or around[b, a]]
+    touching = _touching(kind, points, candidates, threads) if candidates else set()
+    return [around[p] and (a, b) not in touching for a, b in pairs for p in ((a, b), (b, a))]
 
 
-def _touching(kind: Kind, points: np.ndarray, threads: int) -> set[tuple[int, int]]:
+def _touching(kind: Kind, points: np.ndarray, pairs: list[tuple[int, int]], threads: int) -> set[tuple[int, int]]:
     meshes = range(len(kind.meshes))
     mesh_of_vertex = np.repeat(meshes, kind.n_vertices)
     mesh_of_face = np.repeat(meshes, [len(kind.faces(m)) for m in meshes])
@@ -213,19 +212,20 @@ def _touching(kind: Kind, points: np.ndarray, threads: int) -> set[tuple[int, in
         "n_vertices": kind.n_vertices,
         "edges_per_mesh": [kind.edges(m) for m in meshes],
         "no_self_collision": meshes,
+        "ignored_pairs": [pair for pair in itertools.combinations(meshes, 2) if pair not in pairs],
         "threads": threads,
     }
     faces = [kind.faces(m) for m in meshes]
     edge_face = oracle.intersections(points, faces, **scene)
     near = oracle.proximity(points, 0.0, faces, **scene)
-    pairs = np.concatenate(
+    found = np.concatenate(
         [
             np.column_stack([mesh_of_vertex[edge_face[:, 0]], mesh_of_face[edge_face[:, 2]]]),
             np.column_stack([mesh_of_vertex[near.vf[:, 0]], mesh_of_face[near.vf[:, 1]]]),
             mesh_of_vertex[near.ee[:, [0, 2]]],
         ]
     )
-    return set(map(tuple, np.sort(pairs, axis=1).tolist()))
+    return set(map(tuple, np.sort(found, axis=1).tolist()))
 
 
 def core_containment(name: str, queries: np.ndarray, accuracy: str, simd: str) -> tuple[np.ndarray, np.ndarray]:
