@@ -122,15 +122,17 @@ def slope(x: Sequence[float], y: Sequence[float]) -> float:
     return float(np.polyfit(np.log(x), np.log(y), 1)[0])
 
 
-def in_turn(what: str, ways: dict[str, Callable], rounds: int) -> tuple[dict[str, list[float]], dict]:
+def in_turn(
+    what: str, ways: dict[str, Callable], rounds: int, clock: Callable[[], float] = time.perf_counter
+) -> tuple[dict[str, list[float]], dict]:
     """ms of each call by way, all ways in turn in each round after one of warm-up; and their last results."""
     ms, found = {way: [] for way in ways}, {}
     with bar(what, (rounds + 1) * len(ways)) as done:
         for turn in range(rounds + 1):
             for way, ask in ways.items():
-                began = time.perf_counter()
+                began = clock()
                 found[way] = ask()
                 if turn:
-                    ms[way].append(1e3 * (time.perf_counter() - began))
+                    ms[way].append(1e3 * (clock() - began))
                 done()
     return ms, found

@@ -11,7 +11,7 @@ import pytest
 from oracle import rigid_results
 
 import hpccd_core as hc
-from bench import distance, page, step
+from bench import distance, inside, page, step
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command, measure, sources
 from hpccd_ros.bench.sources import of_scene
@@ -30,6 +30,7 @@ SUBJECTS = {
     "distance": (*STRIP, "--separations", "0.02,0.002"),
     "step": STRIP,
     "motion": ("rod-twist-like", "--size", "0.02", "--steps", "1", *ONE),
+    "inside": ("--size", "0.02", "--points", "300", *ONE),
     "accuracy": ("--parts", "sweeps", "--sweep-queries", "40"),
     "rigid": ("--parts", "truth,bounds", "--queries", "200"),
 }
@@ -99,6 +100,15 @@ def check_motion(rows):
     assert (alike["way"], each["way"]) == ("step", "motion") and alike["touching"] == each["touching"] == 0
     assert each["mean"] > alike["mean"] == pytest.approx(0.9 * alike["step"])
     assert each["smallest_over_step"] >= 0.9 * (1 - 1e-9)
+
+
+def check_inside(rows):
+    by = {part: [row for row in rows if row["part"] == part] for part in inside.PARTS}
+    assert len(by["points"]) == 4 * (len(inside.KINDS) + 1) and not any(row["wrong"] for row in by["points"])
+    hard = [row for row in by["points"] if row["points"] == "hard" and row["state"] == "still"]
+    assert len(hard) == 4 and all(row["on_surface"] > 0 for row in hard)
+    assert all(row["curves"] > 0 and row["length"] > 1 for row in by["curves"])
+    assert [row["mesh"] for row in by["containment"]] == list(inside.STREAMS)
 
 
 def check_accuracy(rows):
@@ -265,6 +275,9 @@ def test_a_peer_that_is_not_installed_is_named(bench, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "ipctk", None)  # as Python notes a module that cannot be imported
     assert bench("peer", *STRIP)[0] == 2
     assert "pip install" in capsys.readouterr().err
+    monkeypatch.setitem(sys.modules, "trueform", None)
+    assert bench("inside", "--peers", "trueform")[0] == 2
+    assert "pip install trueform" in capsys.readouterr().err
 
 
 def test_a_peer_beside_it(bench):
