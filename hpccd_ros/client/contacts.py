@@ -249,8 +249,8 @@ def pair_summary(message: PairSummaryArray, mesh_a: str, mesh_b: str) -> PairSum
     Returns
     -------
     hpccd.msg.PairSummary
-        For several pairs of links: the sum of their contacts, the earliest time of impact and the smallest distance,
-        which is NaN if that of a pair is unknown.
+        For several pairs of links: the sum of their contacts, the earliest time of impact, the smallest distance, which
+        is NaN if that of a pair is unknown, and whether any link lies inside.
 
     Raises
     ------
@@ -281,10 +281,20 @@ def pair_summary(message: PairSummaryArray, mesh_a: str, mesh_b: str) -> PairSum
     if len(found) == 1 and {found[0].mesh_a, found[0].mesh_b} == {mesh_a, mesh_b}:
         return found[0]
     first, second = (mesh_a, mesh_b) if any(as_given) else (mesh_b, mesh_a)
+    inside = [
+        pair.inside if belongs(pair.mesh_a, first) and belongs(pair.mesh_b, second) else _swapped(pair.inside)
+        for pair in found
+    ]
     return PairSummary(
         mesh_a=first,
         mesh_b=second,
         count=sum(pair.count for pair in found),
         first_toc=min(pair.first_toc for pair in found),
         distance=float(np.min([pair.distance for pair in found])),  # NaN if one of them is
+        inside=int(np.bitwise_or.reduce(inside)),
     )
+
+
+def _swapped(inside: int) -> int:
+    """That of the same two meshes in the other order."""
+    return (inside & 1) << 1 | (inside & 2) >> 1

@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 
 import hpccd_core as hc
 
+# Gap.inside -> whether mesh_a lies inside, whether mesh_b does.
+SIDES_INSIDE = {None: (False, False), "a": (True, False), "b": (False, True), "both": (True, True)}
+
 Floats = NDArray[np.float64]
+
+
+def inside_code(sides: tuple[bool, bool]) -> int:
+    """The value of `inside` in messages, of the first and the second side."""
+    return sides[0] + 2 * sides[1]
 
 
 def directions(gaps: Sequence[hc.Gap]) -> Floats:
@@ -73,10 +81,11 @@ def closing_speeds(
 
 
 def times_to_contact(gaps: Sequence[hc.Gap], speeds: Floats) -> Floats:
-    """(P,): s; 0: they touch; +inf: they do not approach; NaN: unknown. speeds: `closing_speeds`."""
+    """(P,): s; 0: they touch, or one is inside the other; +inf: they do not approach; NaN: unknown. speeds:
+    `closing_speeds`."""
     times = np.full(len(gaps), np.nan)
     for row, (gap, speed) in enumerate(zip(gaps, speeds, strict=True)):
-        if gap.kind and gap.distance == 0:
+        if gap.kind and (gap.distance == 0 or gap.inside):
             times[row] = 0.0
         elif gap.kind and not np.isnan(speed):
             times[row] = gap.distance / float(speed) if speed > 0 else np.inf
@@ -84,9 +93,10 @@ def times_to_contact(gaps: Sequence[hc.Gap], speeds: Floats) -> Floats:
 
 
 def nearest(gaps: Sequence[hc.Gap]) -> int | None:
-    """Row of the smallest distance of different meshes, the first of several; None: there is none."""
+    """Row of the smallest distance of different meshes, inside before all; the first of several; None: there is
+    none."""
     rows = [row for row, gap in enumerate(gaps) if gap.kind and gap.mesh_a != gap.mesh_b]
-    return min(rows, key=lambda row: gaps[row].distance, default=None)
+    return min(rows, key=lambda row: (gaps[row].inside is None, gaps[row].distance), default=None)
 
 
 @dataclass(frozen=True)

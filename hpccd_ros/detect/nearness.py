@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether different meshes come within a distance during a step. No ROS, no threads."""
+"""Whether different meshes come within a distance during a step, or lie inside each other. No ROS, no threads."""
 
 from dataclasses import replace
 
@@ -24,8 +24,10 @@ class Nearness:
     def __init__(self, builder: SceneBuilder, options: Options, distance: float) -> None:
         self._detector = StepDetector(builder.between_meshes, _asking(options, distance))
         self._names = [mesh.name for mesh in builder.meshes]
+        self._tested = {name for pair in builder.pairs for name in pair}
         self._static = [number for number, mesh in enumerate(builder.meshes) if mesh.static]
         self._apart: SceneFrame | None = None  # no edge intersects a face there
+        self._outside: SceneFrame | None = None  # no mesh lies inside another there
         self._last_gaps: tuple[SceneFrame, list[hc.Gap]] | None = None
 
     def set(self, options: Options, distance: float) -> None:
@@ -39,9 +41,7 @@ class Nearness:
     def within(self, start: SceneFrame, end: SceneFrame) -> tuple[tuple[str, str] | None, float]:
         """(the names of two meshes that came within the distance, that distance); None: none did. Of several pairs of
         meshes any one. Raises the core's errors."""
-        # A static mesh may have been placed elsewhere, without a motion.
-        stays = all(start.vertices[mesh] is end.vertices[mesh] for mesh in self._static)
-        apart, self._apart = stays and self._apart is start, None
+        apart, self._apart = self._stays(start, end) and self._apart is start, None
         found = self._detector.detect(start, end)
         near = self._meshes(found.contacts)
         # An edge through the middle of a large face may be far from its border and corners: the meshes intersect, and
@@ -51,6 +51,30 @@ class Nearness:
         if near is None:
             self._apart = end
         return near, found.options.separation.minimum
+
+    def inside(self, start: SceneFrame, end: SceneFrame) -> tuple[str, str] | None:
+        """(the name of a mesh, that of the closed one inside which it lies at the end) after a step in which `within`
+        found none; None: there is none. Raises the core's errors."""
+        # A mesh that gets inside meets the other's surface on its way, so only starts are tested.
+        outside, self._outside = self._stays(start, end) and self._outside is start, None
+        if not outside:
+            for gap in self._detector.distances(end):
+                if gap.inside:
+                    return (gap.mesh_b, gap.mesh_a) if gap.inside == "b" else (gap.mesh_a, gap.mesh_b)
+        self._outside = end
+        return None
+
+    def not_closed(self, frame: SceneFrame) -> list[str]:
+        """Names of the meshes with faces that are not closed: what lies inside them is unknown."""
+        return [
+            name
+            for name, topology in zip(self._names, frame.topologies, strict=True)
+            if name in self._tested and len(topology.faces) and not hc.closed(topology.faces)
+        ]
+
+    def _stays(self, start: SceneFrame, end: SceneFrame) -> bool:
+        """Whether no static mesh was placed elsewhere, without a motion."""
+        return all(start.vertices[mesh] is end.vertices[mesh] for mesh in self._static)
 
     def slowdown(self, start: SceneFrame, end: SceneFrame, distance: float, time: float) -> Slowdown:
         """How far to slow down after a step that came nowhere within ``distance``. time: s in which meshes may come

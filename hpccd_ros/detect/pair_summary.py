@@ -7,18 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from hpccd_core.mesh_layout import mesh_of
+from hpccd_ros.detect.approach import SIDES_INSIDE, inside_code
 from hpccd_ros.detect.step_detector import Detection
 
 
 @dataclass(frozen=True)
 class PairSummary:
-    """``count`` contacts, the first at ``first_toc`` (+inf: none); ``distance`` at the step's end, NaN: unknown."""
+    """``count`` contacts, the first at ``first_toc`` (+inf: none); ``distance`` at the step's end, NaN: unknown;
+    ``inside``: 1 if mesh_a lies inside mesh_b then, 2 for the reverse, 3 for both."""
 
     mesh_a: str
     mesh_b: str
     count: int
     first_toc: float
     distance: float
+    inside: int
 
 
 def summarise(found: Detection) -> list[PairSummary]:
@@ -26,14 +29,15 @@ def summarise(found: Detection) -> list[PairSummary]:
     names = found.layout.mesh_names
     counts, earliest = _by_pair(found)
     index = {name: number for number, name in enumerate(names)}
-    distances = {frozenset((gap.mesh_a, gap.mesh_b)): gap.distance for gap in found.gaps or ()}
+    gaps = {(gap.mesh_a, gap.mesh_b): gap for gap in found.gaps or ()}
     return [
         PairSummary(
             a,
             b,
             int(counts[index[a], index[b]]),
             float(earliest[index[a], index[b]]),
-            float(distances.get(frozenset((a, b)), math.nan)),
+            gaps[a, b].distance if (a, b) in gaps else math.nan,
+            inside_code(SIDES_INSIDE[gaps[a, b].inside]) if (a, b) in gaps else 0,
         )
         for a, b in found.tested_pairs
     ]

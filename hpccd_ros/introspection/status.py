@@ -27,7 +27,7 @@ _REMEDIES = {
 _REASONS = "; docs/troubleshooting.md has the meaning of each reason"
 _OTHER_MESH = "unknown_mesh"
 # Why stop is true although all is well with the node.
-_WORKING = ("", "near")
+_WORKING = ("", "near", "inside")
 
 Status = tuple[bytes, str, dict[str, str]]
 

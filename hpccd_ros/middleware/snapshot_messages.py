@@ -66,8 +66,10 @@ def fill_distances(
     approached: as `approach.approached` returns it."""
     count = len(gaps)
     kind, meshes = np.empty(count, np.uint8), np.empty((count, 2), np.uint32)
+    inside = np.empty(count, np.uint8)
     features, points = np.full((count, 2, 2), DistanceArray.NONE, np.uint32), np.zeros((count, 2, 3))
     for row, gap in enumerate(gaps):
+        inside[row] = DistanceArray.INSIDE_NONE
         if not gap.kind:
             kind[row] = DistanceArray.NO_PAIR
             meshes[row] = layout.mesh_names.index(gap.mesh_a), layout.mesh_names.index(gap.mesh_b)
@@ -76,12 +78,15 @@ def fill_distances(
         for side, (indices, offsets) in enumerate(_sides(gap, layout)):
             meshes[row, side] = mesh = int(np.searchsorted(offsets, indices[0], side="right")) - 1
             features[row, side, : len(indices)] = [index - offsets[mesh] for index in indices]
+        sides = approach.SIDES_INSIDE[gap.inside]
+        swapped = layout.mesh_names[meshes[row, 0]] != gap.mesh_a
+        inside[row] = approach.inside_code(sides[::-1] if swapped else sides)
     fill_names(message, layout)
     message.kind, message.distance = to_field(kind), to_field(np.array([gap.distance for gap in gaps]))
     message.mesh_a, message.mesh_b = to_field(meshes[:, 0]), to_field(meshes[:, 1])
     message.features_a, message.features_b = to_field(features[:, 0]), to_field(features[:, 1])
     message.points = to_field(points)
-    message.inside = to_field(np.full(count, DistanceArray.INSIDE_NONE, np.uint8))
+    message.inside = to_field(inside)
     message.direction = to_field(approach.directions(gaps))
     message.approach_speed = to_field(approach.approach_speeds(before, gaps, seconds))
     speeds = approach.closing_speeds(before, gaps, approached, seconds)

@@ -3,7 +3,7 @@
 
 The promise: `stop` is false only if, for every enabled pair, the position of each moving mesh is known from messages
 sent within the last `stop_timeout` seconds, each static mesh has a valid position, no newer message about either was
-rejected, and both stay farther apart than `stop_distance` throughout the last step.
+rejected, both stay farther apart than `stop_distance` throughout the last step, and neither lies inside the other.
 
 While `stop` is true, the scale of the speed is 0. Otherwise it is that of the last step.
 
@@ -35,6 +35,7 @@ class Cause(StrEnum):
     INACTIVE = "inactive"  # the node does not detect
     UNANSWERED = "unanswered"  # no step has a result yet
     NEAR = "near"
+    INSIDE = "inside"  # a mesh lies inside another one
     REJECTED = "rejected"  # a message was rejected
     FAILED = "failed"  # a detection
     SILENT = "silent"  # no recent result
@@ -130,9 +131,12 @@ class StopState:
         origins: Sequence[Origin],
         slowdown: Slowdown = _STILL,
         approach_time: float = 0.0,
+        *,
+        inside: tuple[str, str] | None = None,
     ) -> None:
         """The result of a step for this distance and time of approach. near: names of two meshes that came within it;
-        None: none did. origins: of the meshes at its end, in the order of the scene."""
+        None: none did. origins: of the meshes at its end, in the order of the scene. inside: names of a mesh and of
+        that inside which it lies at the end."""
         with self._condition:
             if not self._active:
                 return
@@ -150,6 +154,9 @@ class StopState:
         if near:
             pair = " and ".join(near)
             self._set_cause(Cause.NEAR, f"{pair} came within {distance:g} of each other in the last step")
+            return
+        if inside:
+            self._set_cause(Cause.INSIDE, f"{inside[0]} is inside {inside[1]}")
             return
         with self._condition:
             if distance < self.distance or scene is not self._scene or not self._active:

@@ -12,6 +12,7 @@ from rclpy.duration import Duration
 from std_msgs.msg import Bool, Float64
 
 from hpccd_core import Cancelled
+from hpccd_ros.base.quoting import listed
 from hpccd_ros.detect.approach import Slowdown
 from hpccd_ros.detect.core import CORE_ERRORS
 from hpccd_ros.detect.nearness import Nearness
@@ -31,7 +32,7 @@ LAST_WORD = 0.2  # s for readers to confirm it
 LOG_PERIOD = 1.0  # s
 LONG = 10.0  # s; a longer stop_timeout is reported: 500 is often meant as milliseconds
 # Causes that belong to a node at work; the others are faults, and warnings in the log.
-_EXPECTED = ("", Cause.INACTIVE, Cause.UNANSWERED, Cause.NEAR)
+_EXPECTED = ("", Cause.INACTIVE, Cause.UNANSWERED, Cause.NEAR, Cause.INSIDE)
 
 
 class StopSignal:
@@ -96,7 +97,7 @@ class StopSignal:
             self._node.get_logger().warning(text)
 
 
-_WARNED = {Cause.NEAR: DiagnosticStatus.WARN, Cause.UNANSWERED: DiagnosticStatus.WARN}
+_WARNED = dict.fromkeys((Cause.NEAR, Cause.INSIDE, Cause.UNANSWERED), DiagnosticStatus.WARN)
 
 
 class StopWatch:
@@ -121,10 +122,13 @@ class StopWatch:
         )
         self._nearness: Nearness | None = None
         self._nearness_ms = 0.0
+        self._scene_of: SceneFrame | None = None
+        self._not_closed: list[str] = []
         self._signal = StopSignal(node, self._state, timeout)
 
     def begin(self, builder: SceneBuilder) -> None:
         settings = self._configuration.settings
+        self._scene_of = None
         self._nearness = Nearness(builder, self._configuration.options, settings["stop_distance"])
         links = robot_parameters.links(self._configuration.robots)
         self._state.begin(WatchedScene.of(builder, settings, links))
@@ -155,8 +159,10 @@ class StopWatch:
         fails, stop becomes true, and contacts are computed all the same."""
         began, approach_time, slowdown = time.perf_counter(), self._approach_time, Slowdown()
         try:
+            self._look_at_topologies(end)
             near, distance = self._nearness.within(start, end)
-            if near is None and approach_time > 0:
+            inside = self._nearness.inside(start, end) if near is None else None
+            if near is None and inside is None and approach_time > 0:
                 slowdown = self._nearness.slowdown(start, end, distance, approach_time)
         except Cancelled:
             raise
@@ -166,7 +172,18 @@ class StopWatch:
                 self._node.errors.caught("stop", error)
             return
         self._nearness_ms = 1e3 * (time.perf_counter() - began)
-        self._state.answered(near, distance, end.origins, slowdown, approach_time)
+        self._state.answered(near, distance, end.origins, slowdown, approach_time, inside=inside)
+
+    def _look_at_topologies(self, frame: SceneFrame) -> None:
+        """Warn, once, of meshes of which is unknown what lies inside."""
+        if self._scene_of is not None and self._scene_of.same_scene(frame):
+            return
+        before, self._scene_of, self._not_closed = self._not_closed, frame, self._nearness.not_closed(frame)
+        if set(self._not_closed) - set(before):
+            self._node.get_logger().warning(
+                f"stop: {listed(self._not_closed)}: not closed, so that what lies inside is unknown, and only the "
+                "distance of the surfaces counts; close the mesh where something may get inside without a contact"
+            )
 
     def rejected(self, rejection: Rejection) -> None:
         self._state.rejected(rejection)
@@ -188,6 +205,7 @@ class StopWatch:
             "stop_distance": settings["stop_distance"],
             "stop_timeout": settings["stop_timeout"],
             "clock_error": settings["clock_error"],
+            "not_closed": ", ".join(self._not_closed),
             "look_ms": f"{self._nearness_ms:.3f}",
         }
         text = "false: nothing is near"

@@ -107,7 +107,14 @@ def test_summaries_are_those_of_the_pairs_selected_one_by_one():
     is_in = lambda mesh, name: name in (mesh, mesh.partition("/")[0])  # noqa: E731
     for _ in range(50):
         pairs = [
-            PairSummary(mesh_a=a, mesh_b=b, count=int(random.integers(9)), first_toc=random.random(), distance=0.5)
+            PairSummary(
+                mesh_a=a,
+                mesh_b=b,
+                count=int(random.integers(9)),
+                first_toc=random.random(),
+                distance=0.5,
+                inside=int(random.choice([0, 0, 1, 2, 3])) if a != b else 0,
+            )
             for k, a in enumerate(meshes)
             for b in meshes[k:]
             if random.random() < 0.8
@@ -122,6 +129,12 @@ def test_summaries_are_those_of_the_pairs_selected_one_by_one():
                 found = client.pair_summary(PairSummaryArray(pairs=pairs), x, y)
                 assert {found.mesh_a, found.mesh_b} == {x, y} and found.count == sum(pair.count for pair in chosen)
                 assert found.first_toc == min(pair.first_toc for pair in chosen)
+                if is_in(x, y) or is_in(y, x):
+                    continue  # both links are of both sides
+                into = [(p.mesh_a, p.mesh_b) for p in chosen if p.inside & PairSummary.INSIDE_A]
+                into += [(p.mesh_b, p.mesh_a) for p in chosen if p.inside & PairSummary.INSIDE_B]
+                for bit, a, b in ((1, found.mesh_a, found.mesh_b), (2, found.mesh_b, found.mesh_a)):
+                    assert bool(found.inside & bit) == any(is_in(p, a) and is_in(q, b) for p, q in into)
 
 
 @pytest.mark.parametrize("name", [1, None, b"arm"])

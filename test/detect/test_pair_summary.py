@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from waving_sheet import sheet_faces, sheet_positions
 
+from hpccd_core import shapes
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.pair_summary import summarise
 from hpccd_ros.detect.scene import SceneBuilder
@@ -73,3 +74,17 @@ def test_a_result_of_the_scene_before_has_the_pairs_of_its_own():
     found = detection(SceneBuilder(MESHES, (("a", "b"),)))
     told = {(one.mesh_a, one.mesh_b) for one in summarise(found)}
     assert ("a", "a") in told and ("a", "room") in told and ("a", "b") not in told
+
+
+def test_which_mesh_lies_inside():
+    """In the order of the scene, and unknown without distances."""
+    ball, faces = shapes.icosphere(1)
+    for radii, inside in (((1.0, 2.0), 1), ((2.0, 1.0), 2), ((1.0, 1.0), 0)):
+        frames = [
+            SceneFrame(k, k, "", (Topology(0, len(ball), faces),) * 2, tuple(r * ball for r in radii), ("a", "b"), 0.0)
+            for k in range(2)
+        ]
+        builder = SceneBuilder(tuple(map(MeshSettings, "ab")))
+        for distances in (True, False):
+            found = StepDetector(builder, Options(distances=distances)).detect(*frames)
+            assert [one.inside for one in summarise(found) if one.mesh_a != one.mesh_b] == [inside * distances]

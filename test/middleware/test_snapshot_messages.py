@@ -118,6 +118,24 @@ def test_smallest_distances():
     assert (message.mesh_names, list(message.topology_versions)) == (["cloth", "ball", "floor"], [3, 0, 9])
 
 
+def test_inside_is_of_the_sides_of_the_message():
+    """Which may be in the other order than those of the gap; inside is nearer than anything."""
+    points = np.arange(6.0).reshape(2, 3)
+    gaps = [
+        hc.Gap("cloth", "ball", 0.25, "vertex-face", (1, 9), points),
+        hc.Gap("cloth", "ball", 0.5, "vertex-face", (1, 9), points, inside="a"),
+        hc.Gap("cloth", "ball", 0.5, "vertex-face", (12, 7), points, inside="a"),  # the vertex is of the second mesh
+        hc.Gap("cloth", "ball", 0.5, "vertex-face", (12, 7), points, inside="b"),
+        hc.Gap("cloth", "ball", 0.5, "vertex-face", (12, 7), points, inside="both"),
+    ]
+    message = DistanceArray()
+    snapshot_messages.fill_distances(message, gaps, LAYOUT, before=gaps, seconds=1.0)
+    names = ("INSIDE_NONE", "INSIDE_A", "INSIDE_B", "INSIDE_A", "INSIDE_BOTH")
+    assert list(message.inside) == [getattr(DistanceArray, name) for name in names]
+    assert list(message.mesh_a) == [0, 0, 1, 1, 1] and message.nearest == 1
+    assert list(message.time_to_contact) == [math.inf, 0, 0, 0, 0]
+
+
 def test_no_meshes_to_tell_of():
     message = DistanceArray()
     snapshot_messages.fill_distances(message, [], LAYOUT)
