@@ -39,7 +39,8 @@ REJECTED = {
     ),
     "invented-stop": (
         CLOTH | {"stop_now": True},
-        "stop_now: no such parameter; those of the topic stop are stop_distance, stop_timeout, clock_error",
+        "stop_now: no such parameter; those of the topics stop and speed_scale are stop_distance, stop_timeout, "
+        "approach_time, clock_error",
     ),
     "misspelt-accuracy": (CLOTH | {"acuracy": "exact"}, "did you mean accuracy?"),
     "capitals": (CLOTH | {"Accuracy": "exact"}, "did you mean accuracy?"),
