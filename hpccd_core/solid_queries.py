@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _core, arguments, device_arrays
-from .array_types import MeshName, Positions, Stream
+from .array_types import ArrayLike, MeshName, Positions, Stream
 from .core_calls import SnapshotCalls
 from .solids import SignedDistances
 
 
 class SolidQueries(SnapshotCalls):
-    """Queries of closed meshes at one time. Coordinates may be as large as 1e300; results are on the host."""
+    """Queries of meshes as solids at one time. Coordinates may be as large as 1e300; results are on the host."""
 
     _mesh_numbers: Mapping[str, int]
 
@@ -103,6 +103,58 @@ class SolidQueries(SnapshotCalls):
         """
         distance, faces, closest = self._ask_points("signed_distances", vertices, points, mesh, stream)
         return SignedDistances(self._by_world(distance), self._by_world(faces), self._by_world(closest))
+
+    def separating_translation(
+        self, vertices: Positions, mesh_a: MeshName, mesh_b: MeshName, direction: ArrayLike, *, stream: Stream = None
+    ) -> float:
+        """How far one mesh must move along a direction until it is free of another one.
+
+        Parameters
+        ----------
+        vertices : Positions, shape (V, 3)
+            One frame. Coordinates may be as large as 1e300.
+        mesh_a, mesh_b : str or int
+            Names or numbers of two different meshes with faces. Mesh a moves.
+        direction : ArrayLike, shape (3,)
+            Of any length above 0.
+        stream : Stream, optional
+
+        Returns
+        -------
+        float
+            The infimum of the s >= 0 for which a, moved by s * direction / |direction|, is free of b, in the unit of
+            the coordinates: within 1e-12 of its own size, above or below. At s they may touch.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If an argument is invalid, if a mesh has no faces, or if the detector has worlds.
+
+        Notes
+        -----
+        Free: no face of one has a point in common with a face of the other, and no part of a mesh is inside the other
+        one where that is closed. Decided as by rational arithmetic, on the CPU. The rules of the scene (ignored pairs,
+        separations, tested features) do not apply: the query names its meshes. Beyond s the meshes may meet again.
+        The cost grows with the number of faces that the contact passes on the way.
+
+        Examples
+        --------
+        >>> import hpccd_core as hc
+        >>> vertices, faces = hc.shapes.box()
+        >>> scene = hc.Scene()
+        >>> for name in ("a", "b"):
+        ...     _ = scene.add_mesh(name, faces)
+        >>> detector = hc.Detector(scene)
+        >>> positions = {"a": vertices, "b": vertices + [0.25, 0, 0]}
+        >>> detector.separating_translation(positions, "a", "b", (-1, 0, 0))
+        0.75
+        """
+        a, b = (arguments.mesh_number(n, m, self._mesh_numbers) for n, m in (("mesh_a", mesh_a), ("mesh_b", mesh_b)))
+        along = arguments.reals("direction", direction)
+        if along.shape != (3,):
+            raise ValueError(f"direction: expected shape (3,), got {along.shape}")
+        s: float = self._ask("separating_translation", vertices, stream, a, b, along.tolist())
+        return s
 
     def _ask_points(self, query: str, vertices: object, points: object, mesh: MeshName, stream: object) -> Any:
         number = arguments.mesh_number("mesh", mesh, self._mesh_numbers)

@@ -461,6 +461,13 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
           },
           "vertices"_a, "points"_a, "mesh"_a)
       .def(
+          "separating_translation",
+          [](Detector& d, const GivenPositions& vertices, std::uint32_t mesh_a, std::uint32_t mesh_b,
+             const std::array<double, 3>& direction) {
+            return unlocked([&] { return d.separating_translation(vertices.positions, mesh_a, mesh_b, direction); });
+          },
+          "vertices"_a, "mesh_a"_a, "mesh_b"_a, "direction"_a)
+      .def(
           "set_separation",
           [](Detector& d, std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {
             unlocked_if_busy(d, [&] { d.set_separation(mesh_a, mesh_b, separation); });

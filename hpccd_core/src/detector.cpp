@@ -2,6 +2,7 @@
 // Checks the inputs, selects the backend, and falls back to the CPU if that backend fails.
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -112,6 +113,21 @@ struct Detector::Impl {
     check("vertices_t0", t0), check("vertices_t1", t1);
     if (t0.is_double != t1.is_double)
       throw InvalidArgument("vertices_t0, vertices_t1: must both be float32 or both be float64; convert one of them");
+  }
+
+  // Two meshes with faces, in one world.
+  void check_solids(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
+    const auto& meshes = common.scene->meshes();
+    if (options().worlds > 1)
+      throw InvalidArgument("worlds: this query takes one world; ask a detector without worlds for each of them");
+    if (mesh_a >= meshes.size() || mesh_b >= meshes.size())
+      throw InvalidArgument("mesh_a, mesh_b: the scene has " + std::to_string(meshes.size()) +
+                            " meshes; give the numbers that Scene::add_mesh() returned");
+    if (mesh_a == mesh_b) throw InvalidArgument("mesh_a, mesh_b: are the same mesh; give two");
+    for (const std::uint32_t mesh : {mesh_a, mesh_b})
+      if (meshes[mesh].n_faces == 0)
+        throw InvalidArgument(std::string(mesh == mesh_a ? "mesh_a" : "mesh_b") + ": '" + meshes[mesh].name +
+                              "' has no faces; give a mesh with faces");
   }
 
   // Throws if results are on the device, where the host cannot read them.
@@ -433,6 +449,18 @@ std::vector<Gap> Detector::distances(Positions vertices) {
     auto gaps = backend.distances(v);
     if (gaps) found = {{"gaps", gaps->size()}};
     return gaps;
+  });
+}
+
+double Detector::separating_translation(Positions vertices, std::uint32_t mesh_a, std::uint32_t mesh_b,
+                                        const std::array<double, 3>& direction) {
+  const StandardArithmetic arithmetic;
+  impl_->check_solids(mesh_a, mesh_b);
+  const Vec3<double> d{direction[0], direction[1], direction[2]};
+  if (!std::ranges::all_of(direction, [](double x) { return std::isfinite(x); }) || max_norm(d) == 0)
+    throw InvalidArgument("direction: must be finite and not zero");
+  return impl_->snapshot(vertices, [&](DetectionBackend& backend, Positions v, Counts&) {
+    return backend.separating_translation(v, {mesh_a, mesh_b}, d);
   });
 }
 

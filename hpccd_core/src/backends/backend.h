@@ -4,6 +4,8 @@
 // positions of one; WorldByWorld turns it into a backend for many.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <span>
@@ -11,6 +13,7 @@
 #include <vector>
 
 #include "backends/failures.h"
+#include "base/vec3.h"
 #include "hpccd/hpccd.h"
 
 namespace hpccd {
@@ -44,6 +47,10 @@ class DetectionBackend {
   // Of points and a closed mesh.
   virtual std::optional<WindingNumbers> winding_numbers(Positions, Positions, std::uint32_t) { return std::nullopt; }
   virtual std::optional<SignedDistances> signed_distances(Positions, Positions, std::uint32_t) { return std::nullopt; }
+  // For one world.
+  virtual std::optional<double> separating_translation(Positions, std::array<std::uint32_t, 2>, const Vec3<double>&) {
+    return std::nullopt;
+  }
 
   // Adds the counts of the last step, and its stages on a device.
   virtual void count(std::map<std::string, std::uint64_t>& stats) const = 0;

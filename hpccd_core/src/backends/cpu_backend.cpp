@@ -10,6 +10,7 @@
 #include "paper/primitive_pairs.h"
 #include "scene/edge_sample.h"
 #include "solid/points.h"
+#include "solid/translation.h"
 #include "traverse/leaf_hulls.h"
 
 namespace hpccd {
@@ -300,6 +301,22 @@ std::optional<SignedDistances> CpuBackend::signed_distances(Positions vertices, 
   shared_.profiler.mark("traverse");
   shared_.cancellation.heed();
   return found;
+}
+
+MovedPair CpuBackend::moved_pair(Positions vertices, std::array<std::uint32_t, 2> meshes) {
+  fit_snapshot(vertices);
+  topologies_.resize(shared_.scene->meshes().size());
+  for (const std::uint32_t mesh : meshes)
+    if (!topologies_[mesh]) topologies_[mesh] = topology_of(*shared_.scene, mesh);
+  return {shared_.tree.tree(),     shared_.tree.motion(),   shared_.features,    meshes,
+          *topologies_[meshes[0]], *topologies_[meshes[1]], shared_.cancellation};
+}
+
+std::optional<double> CpuBackend::separating_translation(Positions vertices, std::array<std::uint32_t, 2> meshes,
+                                                         const Vec3<double>& direction) {
+  const double s = hpccd::separating_translation(moved_pair(vertices, meshes), direction);
+  shared_.profiler.mark("translation");
+  return s;
 }
 
 // Pairs of features within a distance.

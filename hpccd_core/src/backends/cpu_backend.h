@@ -15,6 +15,7 @@
 #include "contacts/canonical.h"
 #include "paper/method.h"
 #include "solid/containment.h"
+#include "solid/moved_pair.h"
 #include "traverse/worker.h"
 
 namespace hpccd {
@@ -35,6 +36,8 @@ class CpuBackend final : public DetectionBackend {
   std::optional<std::vector<Gap>> distances(Positions vertices) override;
   std::optional<WindingNumbers> winding_numbers(Positions vertices, Positions points, std::uint32_t mesh) override;
   std::optional<SignedDistances> signed_distances(Positions vertices, Positions points, std::uint32_t mesh) override;
+  std::optional<double> separating_translation(Positions vertices, std::array<std::uint32_t, 2> meshes,
+                                               const Vec3<double>& direction) override;
 
   // For several worlds: at the beginning of a call, and before and after each world. count() covers all worlds since
   // then.
@@ -76,6 +79,7 @@ class CpuBackend final : public DetectionBackend {
   void begin_motion(Positions t0, Positions t1, Tests tests, MovingTree& tree);
   void begin_proximity(Positions vertices, double distance, ProximitySearch& search);
   void fit_snapshot(Positions vertices, double distance = 0);
+  MovedPair moved_pair(Positions vertices, std::array<std::uint32_t, 2> meshes);
   void walk_tree(Search& search);
   template <class Test>
   void test_each(const std::vector<LeafPair>& pairs, Test&& test);
@@ -103,6 +107,7 @@ class CpuBackend final : public DetectionBackend {
   };
   std::unique_ptr<WholeWays> whole_;
   std::vector<Shortening::Touching> touching_;
+  std::vector<std::optional<MeshTopology>> topologies_;  // by mesh, each created by the first query that needs it
   // Created by the first search for smallest distances.
   std::optional<MeshPairs> mesh_pairs_;
   std::optional<Containment> containment_;

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+// Two meshes of a snapshot, one of which is translated: boxes of their parts, and the times at which faces meet.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "base/cancellation.h"
+#include "base/vec3.h"
+#include "bvh/motion_bounds.h"
+#include "bvh/tree.h"
+#include "scene/features.h"
+
+namespace hpccd {
+
+// What does not depend on positions.
+struct MeshTopology {
+  bool closed;
+  std::vector<std::uint32_t> representatives;  // a vertex of each part that faces connect
+};
+MeshTopology topology_of(const Scene& scene, std::uint32_t mesh);
+
+// The faces of one mesh, in boxes of double precision. Coordinates are multiplied by a power of two, so that the
+// largest of both meshes is between 1/2 and 1. (Losses by underflow are far below the error bounds.)
+struct BoxedMesh {
+  struct Box {
+    Vec3<double> low, high;
+  };
+  struct Node {
+    Box box;
+    std::uint32_t children = 0;  // the left child; the right one follows it. 0: a leaf
+    std::uint32_t first_face = 0, end_face = 0;
+  };
+  std::vector<Node> nodes;  // children come after their parents
+  std::vector<std::uint32_t> roots;
+  std::vector<std::array<std::uint32_t, 3>> faces;  // vertices, in the order of the leaves
+  std::vector<std::uint32_t> face_numbers;          // in the scene
+  const MeshTopology* topology = nullptr;
+};
+
+// A time of first or last contact. The features whose contact it is determine it: a vertex and a face, two edges, or in
+// degenerate cases fewer vertices. Without any it is 0.
+struct ContactTime {
+  double at = 0, error = 0;  // in the scale of BoxedMesh
+  int n_a = 0, n_b = 0;
+  std::array<std::uint32_t, 3> a{}, b{};  // vertices, in ascending order
+  bool same_features(const ContactTime& other) const {
+    return n_a == other.n_a && n_b == other.n_b && a == other.a && b == other.b;
+  }
+};
+
+struct ContactInterval {
+  ContactTime begin, end;
+};
+
+class MovedPair {
+ public:
+  // The arguments must outlive the object.
+  MovedPair(const Tree& tree, const MotionBounds& snapshot, const Features& features,
+            std::array<std::uint32_t, 2> meshes, const MeshTopology& a, const MeshTopology& b,
+            const Cancellation& cancellation);
+
+  const BoxedMesh& a() const { return meshes_[0]; }
+  const BoxedMesh& b() const { return meshes_[1]; }
+  double scale() const { return scale_; }
+  Vec3<double> given(std::uint32_t vertex) const {
+    const double* x = snapshot_.vertices[vertex].t0;
+    return {x[0], x[1], x[2]};
+  }
+  Vec3<double> position(std::uint32_t vertex) const { return scale_ * given(vertex); }
+  // The exponent of the lowest bit of any coordinate of both meshes, and the number of bits from there to the highest.
+  struct Bits {
+    int low, count;
+  };
+  const Bits& bits() const;
+  void heed() const { cancellation_.heed(); }
+
+ private:
+  void copy(BoxedMesh& mesh, const Tree& tree, const Features& features, std::uint32_t number) const;
+  void fit(BoxedMesh& mesh) const;
+
+  const MotionBounds& snapshot_;
+  const Cancellation& cancellation_;
+  BoxedMesh meshes_[2];
+  double scale_ = 1;
+  mutable std::optional<Bits> bits_;
+};
+
+// Translation of mesh a along one direction, from a place to which it has been translated before: at time s by
+// `from` + s direction, with the direction's length 1. Times are in the scale of BoxedMesh.
+enum class Decided : bool { exactly, roughly };
+
+class Translation {
+ public:
+  // Exactly only from 0. Roughly: times within rounding errors, without those of faces that the direction is in.
+  Translation(const MovedPair& pair, const Vec3<double>& direction, const Vec3<double>& from = {0, 0, 0},
+              Decided decided = Decided::exactly);
+
+  // Two faces, or faces and edges, meet in one closed interval of times, as two convex sets whose difference meets a
+  // line. These find, over all pairs of faces:
+  // the latest end of all intervals, or of those that contain a time, if there is one;
+  std::optional<ContactTime> latest_end(const ContactTime* containing = nullptr) const;
+  // the earliest begin after a time, if there is one.
+  std::optional<ContactTime> earliest_begin(const ContactTime& after) const;
+
+  // Just after a time at which no interval continues: whether a component of one mesh is inside the closed other one.
+  bool contained_after(const ContactTime& time) const;
+
+  // Sign of the difference of two times.
+  int compare(const ContactTime& s, const ContactTime& t) const;
+  // In units of the scene, within 1e-15 of its size.
+  double length(const ContactTime& time) const;
+
+ private:
+  struct Range {
+    double low, high;
+  };
+  struct InFrame {
+    double u[3], v[3], w[3];
+  };
+  class Exact;
+
+  bool meeting(const BoxedMesh::Box& a, const BoxedMesh::Box& b, Range& range) const;
+  InFrame in_frame(const std::array<std::uint32_t, 3>& face, bool moves) const;
+  enum class Found : std::uint8_t { no, yes, unsure };
+  Found interval(const InFrame& a, const InFrame& b, const std::array<std::uint32_t, 3>& face_a,
+                 const std::array<std::uint32_t, 3>& face_b, ContactInterval& found) const;
+  bool times(const InFrame& a, const InFrame& b, const std::array<std::uint32_t, 3>& face_a,
+             const std::array<std::uint32_t, 3>& face_b, ContactInterval& found) const;
+  template <bool latest, class Accept>
+  std::optional<ContactTime> search(double after, double before, Accept&& accept) const;
+  int winding_after(std::uint32_t vertex, bool of_a, const ContactTime& time) const;
+
+  const MovedPair& pair_;
+  Vec3<double> given_, from_, axis_[3];  // axis_[2]: the direction
+  bool exact_;
+};
+
+}  // namespace hpccd
