@@ -154,7 +154,7 @@ class Open3D:
 class LibIGL:
     note = (
         "libigl: its Python bindings keep no tree, so each call makes one; signed_distance with "
-        "SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER multiplies distances by 1 - 2 w, and w is not quite 0 or 1"
+        "SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER multiplies distances by 1 - 2 |w|, and w is not quite 0 or 1"
     )
     name, dtypes = "libigl", (np.float64,)
 

@@ -145,8 +145,33 @@ def _of_motions(rows):
     return by("key", "way")([{**row, "key": (row["scene"], row["number"])} for row in rows])
 
 
+def _beside_peers(rows):
+    """A line for each query and kind of points or pair of meshes: ms of each way, still and deforming, and the wrong
+    signs of all meshes."""
+    lines: dict = {}
+    for row in rows:
+        if row["part"] not in ("points", "curves"):
+            continue
+        curves = row["part"] == "curves"
+        key = ("intersection curves", row["mesh"]) if curves else (row["query"], row["points"])
+        line = lines.setdefault(key, {"query": key[0], "of": key[1]})
+        way = row["way"].partition(",")[0]
+        if row["mesh"] != "overlapping spheres":
+            times = line.setdefault((way,), {})
+            times[row["state"]] = min(row["median_ms"], times.get(row["state"], row["median_ms"]))
+        if not curves and row["state"] == "still" and "," not in row["way"]:
+            line[way, "wrong"] = line.get((way, "wrong"), 0) + row["wrong"]
+    return lines.values()
+
+
+def _still_and_deforming(way: str):
+    return cell(way, shown=lambda times: ", ".join(text(times[state]) for state in ("still", "deforming")))
+
+
 SIZE = _same("scene", "triangles", "contacts")
 OVER_ALL = {"first": "first (/ all)", "step": "`collision_free_step` (/ all)", "trial": "trial steps (/ all)"}
+INSIDE = ("hpccd", "trueform", "open3d", "libigl")
+FOR_TWO_SCENES = ("static meshes", "largest mesh ignored by all", "fast between meshes", "as the scene says")
 METHODS = {f"`{name}`": name for name in ("default", "published", "naive", "front")}
 TABLES = {
     "peer": Table(
@@ -164,15 +189,6 @@ TABLES = {
         | {head: cell(method, 4, shown=_scaling) for head, method in METHODS.items()}
         | {"independent detectors": cell("independent", 4, shown=lambda row: f"{row['speedup']:.2f}")},
         by("scene", "method", "threads"),
-    ),
-    "methods": Table(
-        ("methods-4-cores",),
-        {"scene": "scene"}
-        | {
-            head: cell(variant, shown=lambda row: row["step_ms"])
-            for head, variant in (METHODS | {"AVX2 only": "avx2", "scalar only": "scalar"}).items()
-        },
-        by("scene", "variant"),
     ),
     "memory": Table(
         ("memory-2-cores",),
@@ -198,6 +214,17 @@ TABLES = {
             for part, shown in (("pairs", lab.whole("pairs")), ("ms (/ plain)", over("step_ms", "over_plain")))
         },
         by("scene", "query", "distance"),
+    ),
+    "inside": Table(
+        ("inside-2-cores",),
+        {"query": "query", "points or meshes": "of"}
+        | {f"{name}, ms": _still_and_deforming(name) for name in INSIDE}
+        | {
+            f"wrong signs: {', '.join(INSIDE)}": lambda row: ", ".join(
+                f"{row[name, 'wrong']:,}" for name in INSIDE if (name, "wrong") in row
+            )
+        },
+        _beside_peers,
     ),
     "steps": Table(
         ("step-2-cores",),
@@ -260,16 +287,15 @@ TABLES = {
             )
             for scene in ("cloth-ball", "cloth-funnel", "n-body", "n-body-like-lr", "cloth-drop")
         },
-        by("option", "scene"),
+        lambda rows: by("option", "scene")([row for row in rows if row["option"] not in FOR_TWO_SCENES]),
     ),
     "device-results": Table(
         ("gpu-device-h100",),
-        {"scene": "scene", "accuracy": lambda row: f"`{row['accuracy']}`"}
-        | _same("triangles", "contacts")
+        _same("scene", "triangles", "contacts")
         | {"CPU, ms": "cpu_median_ms", "host to host": "host_median_ms", "device to host": "to_host_median_ms"}
         | {"device to device": "median_ms", "graph": "graph_median_ms"}
         | {"bytes per triangle": lambda row: row["bytes"] / row["triangles"]},
-        lambda rows: [row for row in rows if row["part"] in ("device", "large")],
+        lambda rows: [row for row in rows if row["part"] in ("device", "large") and row["accuracy"] == "exact"],
     ),
     "latency": Table(
         ("ros-4-cores",),
@@ -278,13 +304,6 @@ TABLES = {
         | _triples(1, node_without_core="node", echo="echo")
         | {"node / echo": joined("ratio", digits=2)},
         only(what="latency"),
-    ),
-    "step-loop": Table(
-        ("ros-2-cores",),
-        _same("scene", "triangles")
-        | {"MB sent": lambda row: f"{row['mb_sent']:.2g}"}
-        | _triples(2, over_DDS="loop", in_process="core", difference="more"),
-        only(what="step loop"),
     ),
     "stop": Table(
         ("stop-2-cores",),
