@@ -7,6 +7,7 @@
 #include "gpu/device_motion.cuh"
 #include "gpu/device_near_list.cuh"
 #include "gpu/device_places.cuh"
+#include "gpu/device_points.cuh"
 #include "gpu/device_positions.cuh"
 #include "gpu/device_scene.cuh"
 #include "gpu/device_tree.cuh"
@@ -71,6 +72,13 @@ class DevicePipeline : public Pipeline {
     begin();
     return run_frame(query, vertices, vertices, distance, pool);
   }
+  std::optional<std::vector<std::int32_t>> winding_numbers(Positions vertices, Positions points, u32 mesh,
+                                                           ThreadPool& pool) override {
+    begin();
+    goal_ = Goal::points, query_ = Query::intersections;
+    return vertices.is_double ? winding_numbers<double>(vertices, points, mesh, pool)
+                              : winding_numbers<float>(vertices, points, mesh, pool);
+  }
   bool run_for_earliest(Positions t0, Positions t1, Pairs pairs, Best best, ThreadPool& pool) override {
     begin();
     best_ = best;
@@ -125,9 +133,14 @@ class DevicePipeline : public Pipeline {
   template <class T>
   bool run_frame(Positions t0, Positions t1, double distance, ThreadPool& pool);
   template <class T>
+  std::optional<std::vector<std::int32_t>> winding_numbers(Positions vertices, Positions points, u32 mesh,
+                                                           ThreadPool& pool);
+  template <class T>
   LaunchParams<T> frame_params(double distance, const T* given_t0, const T* given_t1);
   template <class T>
   void launch(LaunchParams<T>& params);
+  template <class T>
+  void launch_refit(LaunchParams<T>& params);
   template <class T>
   void launch_tree(LaunchParams<T>& params);
   template <class T>
@@ -175,11 +188,12 @@ class DevicePipeline : public Pipeline {
   Counters last_counters_{};  // of the last frame that was not only for near lists: reported by stats()
 
   // The purpose of a frame: contacts for the caller, or less.
-  enum class Goal : unsigned char { results, earliest, earliest_of_near, near_list };
+  enum class Goal : unsigned char { results, earliest, earliest_of_near, near_list, points };
   bool for_earliest() const { return goal_ == Goal::earliest || goal_ == Goal::earliest_of_near; }
 
   Hints hints_;
   DeviceNearList near_;
+  DevicePoints points_;
   std::size_t most_near_ = 0;
   bool gave_up_listing_ = false;
   bool given_doubles_ = true;             // in the last frame
@@ -243,6 +257,30 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
 }
 
 template <class T>
+std::optional<std::vector<std::int32_t>> DevicePipeline::winding_numbers(Positions vertices, Positions points, u32 mesh,
+                                                                         ThreadPool& pool) {
+  undecided_.clear(), passes_ = 1;
+  timer_.begin(stream_);
+  const T* given[2];
+  positions_.bring(vertices, vertices, given, pool, stream_);
+  given_doubles_ = vertices.is_double;
+  const PointsTask task = points_.bring(points, mesh, pool, stream_);
+  LaunchParams<T> params = frame_params(0, given[0], given[1]);
+  timer_.mark("upload", stream_);
+  motion_.begin(params, multiprocessors_, stream_);
+  motion_.launch(query_, params, stream_);
+  timer_.mark("bounds", stream_);
+  launch_refit(params);
+  timer_.mark("refit", stream_);
+  launch_winding_numbers(params, task, on_stream());
+  launch_area(params);
+  copy_counters();
+  std::vector<std::int32_t> numbers = points_.numbers(task, stream_);
+  if (host_counters_.data()->bad) return std::nullopt;
+  return numbers;
+}
+
+template <class T>
 LaunchParams<T> DevicePipeline::frame_params(double distance, const T* given_t0, const T* given_t1) {
   LaunchParams<T> params{};
   scene_.fill(params);
@@ -287,9 +325,14 @@ void DevicePipeline::launch(LaunchParams<T>& params) {
 }
 
 template <class T>
-void DevicePipeline::launch_tree(LaunchParams<T>& params) {
+void DevicePipeline::launch_refit(LaunchParams<T>& params) {
   refit_kernel<<<blocks_for(std::size_t{params.all_leaves()} * 32, 128), 128, 0, on_>>>(params);
   check_launch("refit_kernel");
+}
+
+template <class T>
+void DevicePipeline::launch_tree(LaunchParams<T>& params) {
+  launch_refit(params);
   if (query_ == Query::contacts) launch_leaf_kdops(params, on_);
   timer_.mark("refit", on_);
   const auto traverse = of_snapshot(query_) ? traverse_kernel<true, T> : traverse_kernel<false, T>;
@@ -556,7 +599,7 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
   s["gpu_passes"] = passes_;
   s["gpu_segments"] = lists_.n_segments();
   s["gpu_bytes"] = scene_.bytes() + tree_.bytes() + positions_.bytes() + motion_.bytes() + leaf_pairs_.bytes() +
-                   lists_.bytes() + contacts_.bytes() + places_.bytes() + near_.bytes() + hints_.bytes();
+                   lists_.bytes() + contacts_.bytes() + places_.bytes() + near_.bytes() + hints_.bytes() + points_.bytes();
   if (for_earliest() || goal_ == Goal::near_list) s["near_pairs"] = near_.size();
   return s;
 }

@@ -50,6 +50,9 @@ struct EarliestTime {
   double time, away, way;
 };
 
+// In place of a winding number: only integers can decide it.
+inline constexpr std::int32_t undecided_winding = std::numeric_limits<std::int32_t>::min();
+
 class Pipeline {
  public:
   // Throws Error if the device has not enough memory, or if the scene has too many features for 31-bit numbers.
@@ -69,6 +72,10 @@ class Pipeline {
   virtual bool run(Positions t0, Positions t1, Best best, ThreadPool& pool) = 0;
   // The same for one snapshot. distance: for proximity.
   virtual bool run_snapshot(Query query, Positions vertices, double distance, ThreadPool& pool) = 0;
+  // Winding numbers of points on the host around a closed mesh of a snapshot, for one world: undecided_winding for
+  // points on the surface as well. Nothing if a coordinate of a vertex is not finite or too large.
+  virtual std::optional<std::vector<std::int32_t>> winding_numbers(Positions vertices, Positions points,
+                                                                   std::uint32_t mesh, ThreadPool& pool) = 0;
   // After run(): the pairs left to the exact fallback on the CPU, the first feature of each numbered through all
   // worlds.
   virtual const std::vector<Candidate>& undecided() const = 0;

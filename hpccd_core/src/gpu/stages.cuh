@@ -58,4 +58,14 @@ void launch_separations(const LaunchParams<T>& params, const Stages& stages);
 template <class T>
 void launch_snapshot(Query query, const LaunchParams<T>& params, const Stages& stages);
 
+// Points of one world, and their results.
+struct PointsTask {
+  const double* points;  // x y z of each
+  u64 n;
+  u32 mesh;
+  std::int32_t* numbers;  // undecided_winding: only integers can decide
+};
+template <class T>
+void launch_winding_numbers(const LaunchParams<T>& params, const PointsTask& task, const Stages& stages);
+
 }  // namespace hpccd::gpu
