@@ -14,6 +14,7 @@
 #include "gpu/download.h"
 #include "gpu/results_to_device.h"
 #include "scene/static_meshes.h"
+#include "solid/points.h"
 
 namespace hpccd {
 namespace {
@@ -276,12 +277,14 @@ void GpuBackend::prepare_snapshot(gpu::Query query, Positions vertices, double d
 
 void GpuBackend::run_snapshot(gpu::Query query, Positions vertices, double distance) {
   prepare_snapshot(query, vertices, distance);
-  if (!pipeline_->run_snapshot(query, vertices, distance, shared_.pool)) {
-    vertices = on_host(vertices, 0);
-    each_world([&](std::size_t k) { MotionBounds().update(*shared_.scene, of_world(vertices, k), shared_.pool); });
-    throw gpu::Error("the device found bad coordinates where the host finds none");
-  }
+  if (!pipeline_->run_snapshot(query, vertices, distance, shared_.pool)) throw_bad_snapshot(vertices);
   shared_.profiler.mark("gpu");
+}
+
+void GpuBackend::throw_bad_snapshot(Positions vertices) {
+  vertices = on_host(vertices, 0);
+  each_world([&](std::size_t k) { MotionBounds().update(*shared_.scene, of_world(vertices, k), shared_.pool); });
+  throw gpu::Error("the device found bad coordinates where the host finds none");
 }
 
 // Provides a pipeline and a tree: a new one for the first call, and when refitting on the device has degraded it too
@@ -431,6 +434,79 @@ bool GpuBackend::list_near_pairs(Positions t0, double time, const Travel& travel
 Travel GpuBackend::travel_of_frame() const {
   const gpu::EarliestTime frame = pipeline_->earliest();
   return Travel::along_axes(frame.away, frame.way);
+}
+
+// Points and a closed mesh: the CPU decides those that the device leaves undecided, as it does for all of its own.
+
+std::optional<WindingNumbers> GpuBackend::winding_numbers(Positions vertices, Positions points, std::uint32_t mesh) {
+  if (n_worlds() > 1) return std::nullopt;
+  return attempt([&] {
+    points = on_host(points, 1);
+    const std::vector<gpu::PointOnFace> located = locate(vertices, points, mesh, false);
+    WindingNumbers found{std::vector<std::int32_t>(located.size()), std::vector<std::uint8_t>(located.size())};
+    std::vector<std::size_t> open;
+    for (std::size_t i = 0; i < located.size(); ++i) {
+      found.numbers[i] = located[i].winding;
+      if (located[i].winding == gpu::undecided_winding) open.push_back(i);
+    }
+    on_cpu(vertices, points, mesh, open, [&](const MeshInTree& in_tree, Positions rest) {
+      const WindingNumbers decided = hpccd::winding_numbers(in_tree, rest, shared_.pool);
+      for (std::size_t i = 0; i < open.size(); ++i)
+        found.numbers[open[i]] = decided.numbers[i], found.on_surface[open[i]] = decided.on_surface[i];
+    });
+    return found;
+  });
+}
+
+std::optional<SignedDistances> GpuBackend::signed_distances(Positions vertices, Positions points, std::uint32_t mesh) {
+  if (n_worlds() > 1) return std::nullopt;
+  return attempt([&] {
+    points = on_host(points, 1);
+    const std::vector<gpu::PointOnFace> located = locate(vertices, points, mesh, true);
+    SignedDistances found;
+    std::vector<std::size_t> open;
+    for (std::size_t i = 0; i < located.size(); ++i) {
+      const gpu::PointOnFace& p = located[i];
+      if (p.winding == gpu::undecided_winding || p.distance == gpu::undecided_distance) open.push_back(i);
+      found.distance.push_back(p.winding != 0 ? -p.distance : p.distance);
+      found.faces.push_back(p.face);
+      found.closest.push_back({p.closest.x, p.closest.y, p.closest.z});
+    }
+    on_cpu(vertices, points, mesh, open, [&](const MeshInTree& in_tree, Positions rest) {
+      const SignedDistances decided = hpccd::signed_distances(in_tree, rest, shared_.pool);
+      for (std::size_t i = 0; i < open.size(); ++i) {
+        found.distance[open[i]] = decided.distance[i], found.faces[open[i]] = decided.faces[i];
+        found.closest[open[i]] = decided.closest[i];
+      }
+    });
+    return found;
+  });
+}
+
+std::vector<gpu::PointOnFace> GpuBackend::locate(Positions vertices, Positions points, std::uint32_t mesh,
+                                                 bool with_distances) {
+  checked_points(points, shared_.pool);
+  prepare_snapshot(gpu::Query::intersections, vertices, 0);
+  auto located = pipeline_->locate_points(vertices, points, mesh, with_distances, shared_.pool);
+  if (!located) throw_bad_snapshot(vertices);
+  shared_.profiler.mark("gpu");
+  return std::move(*located);
+}
+
+// Calls decide(mesh, points) for the open ones.
+template <class Decide>
+void GpuBackend::on_cpu(Positions vertices, Positions points, std::uint32_t mesh, const std::vector<std::size_t>& open,
+                        Decide&& decide) {
+  if (open.empty()) return;
+  const std::vector<Vec3<double>> all = checked_points(points, shared_.pool);
+  std::vector<double> rest;
+  rest.reserve(3 * open.size());
+  for (const std::size_t i : open) rest.insert(rest.end(), {all[i].x, all[i].y, all[i].z});
+  shared_.tree.bound(on_host(vertices, 0));
+  shared_.tree.fit(shared_.profiler);
+  decide(MeshInTree{shared_.tree.tree(), shared_.tree.motion(), shared_.features, mesh},
+         Positions{rest.data(), open.size(), true});
+  shared_.profiler.mark("exact");
 }
 
 // Points, normals and nearest points of the results.

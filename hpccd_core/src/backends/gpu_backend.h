@@ -27,6 +27,9 @@ class GpuBackend final : public DetectionBackend {
   std::optional<std::vector<double>> earliest(Positions t0, Positions t1) override;
   std::optional<Contacts> proximity(Positions vertices, double distance) override;
   std::optional<Intersections> intersections(Positions vertices) override;
+  // For one world.
+  std::optional<WindingNumbers> winding_numbers(Positions vertices, Positions points, std::uint32_t mesh) override;
+  std::optional<SignedDistances> signed_distances(Positions vertices, Positions points, std::uint32_t mesh) override;
   // As detect, for one world, without points and normals: rows in the memory that the device has written. If there are
   // none after all, they are in `contacts`. Nothing if the device failed.
   std::optional<Detected> detect_in_place(Positions t0, Positions t1);
@@ -87,6 +90,11 @@ class GpuBackend final : public DetectionBackend {
   Contacts near_pairs(Positions vertices, double distance);
   void run_pierced_faces(Positions vertices);
   Intersections pierced_faces(Positions vertices);
+  std::vector<gpu::PointOnFace> locate(Positions vertices, Positions points, std::uint32_t mesh, bool with_distances);
+  template <class Decide>
+  void on_cpu(Positions vertices, Positions points, std::uint32_t mesh, const std::vector<std::size_t>& open,
+              Decide&& decide);
+  [[noreturn]] void throw_bad_snapshot(Positions vertices);
   void prepare_snapshot(gpu::Query query, Positions vertices, double distance);
   void run_snapshot(gpu::Query query, Positions vertices, double distance);
   template <class Bound>

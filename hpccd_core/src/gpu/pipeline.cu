@@ -72,12 +72,13 @@ class DevicePipeline : public Pipeline {
     begin();
     return run_frame(query, vertices, vertices, distance, pool);
   }
-  std::optional<std::vector<std::int32_t>> winding_numbers(Positions vertices, Positions points, u32 mesh,
-                                                           ThreadPool& pool) override {
+  std::optional<std::vector<PointOnFace>> locate_points(Positions vertices, Positions points, u32 mesh,
+                                                        bool with_distances, ThreadPool& pool) override {
     begin();
     goal_ = Goal::points, query_ = Query::intersections;
-    return vertices.is_double ? winding_numbers<double>(vertices, points, mesh, pool)
-                              : winding_numbers<float>(vertices, points, mesh, pool);
+    const PointsTask task = points_.bring(points, mesh, with_distances, pool, stream_);
+    return vertices.is_double ? locate_points<double>(vertices, task, pool)
+                              : locate_points<float>(vertices, task, pool);
   }
   bool run_for_earliest(Positions t0, Positions t1, Pairs pairs, Best best, ThreadPool& pool) override {
     begin();
@@ -133,8 +134,7 @@ class DevicePipeline : public Pipeline {
   template <class T>
   bool run_frame(Positions t0, Positions t1, double distance, ThreadPool& pool);
   template <class T>
-  std::optional<std::vector<std::int32_t>> winding_numbers(Positions vertices, Positions points, u32 mesh,
-                                                           ThreadPool& pool);
+  std::optional<std::vector<PointOnFace>> locate_points(Positions vertices, const PointsTask& task, ThreadPool& pool);
   template <class T>
   LaunchParams<T> frame_params(double distance, const T* given_t0, const T* given_t1);
   template <class T>
@@ -257,14 +257,13 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
 }
 
 template <class T>
-std::optional<std::vector<std::int32_t>> DevicePipeline::winding_numbers(Positions vertices, Positions points, u32 mesh,
-                                                                         ThreadPool& pool) {
+std::optional<std::vector<PointOnFace>> DevicePipeline::locate_points(Positions vertices, const PointsTask& task,
+                                                                      ThreadPool& pool) {
   undecided_.clear(), passes_ = 1;
   timer_.begin(stream_);
   const T* given[2];
   positions_.bring(vertices, vertices, given, pool, stream_);
   given_doubles_ = vertices.is_double;
-  const PointsTask task = points_.bring(points, mesh, pool, stream_);
   LaunchParams<T> params = frame_params(0, given[0], given[1]);
   timer_.mark("upload", stream_);
   motion_.begin(params, multiprocessors_, stream_);
@@ -272,12 +271,12 @@ std::optional<std::vector<std::int32_t>> DevicePipeline::winding_numbers(Positio
   timer_.mark("bounds", stream_);
   launch_refit(params);
   timer_.mark("refit", stream_);
-  launch_winding_numbers(params, task, on_stream());
+  launch_points(params, task, on_stream());
   launch_area(params);
   copy_counters();
-  std::vector<std::int32_t> numbers = points_.numbers(task, stream_);
+  std::vector<PointOnFace> found = points_.results(task, stream_);
   if (host_counters_.data()->bad) return std::nullopt;
-  return numbers;
+  return found;
 }
 
 template <class T>

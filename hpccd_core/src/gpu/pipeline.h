@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "base/vec3.h"
 #include "bvh/tree.h"
 #include "contacts/outputs.h"
 #include "elementary/pair.h"
@@ -50,8 +51,15 @@ struct EarliestTime {
   double time, away, way;
 };
 
-// In place of a winding number: only integers can decide it.
+// A point and a closed mesh. Where only integers can decide, or the surface contains the point, a value is undecided.
 inline constexpr std::int32_t undecided_winding = std::numeric_limits<std::int32_t>::min();
+inline constexpr double undecided_distance = -1;
+struct PointOnFace {
+  double distance;  // not signed
+  Vec3<double> closest;
+  std::uint32_t face;
+  std::int32_t winding;
+};
 
 class Pipeline {
  public:
@@ -72,10 +80,11 @@ class Pipeline {
   virtual bool run(Positions t0, Positions t1, Best best, ThreadPool& pool) = 0;
   // The same for one snapshot. distance: for proximity.
   virtual bool run_snapshot(Query query, Positions vertices, double distance, ThreadPool& pool) = 0;
-  // Winding numbers of points on the host around a closed mesh of a snapshot, for one world: undecided_winding for
-  // points on the surface as well. Nothing if a coordinate of a vertex is not finite or too large.
-  virtual std::optional<std::vector<std::int32_t>> winding_numbers(Positions vertices, Positions points,
-                                                                   std::uint32_t mesh, ThreadPool& pool) = 0;
+  // Winding numbers of points on the host around a closed mesh of a snapshot, for one world, and with_distances where
+  // the mesh is nearest. Nothing if a coordinate of a vertex is not finite or too large.
+  virtual std::optional<std::vector<PointOnFace>> locate_points(Positions vertices, Positions points,
+                                                                std::uint32_t mesh, bool with_distances,
+                                                                ThreadPool& pool) = 0;
   // After run(): the pairs left to the exact fallback on the CPU, the first feature of each numbered through all
   // worlds.
   virtual const std::vector<Candidate>& undecided() const = 0;

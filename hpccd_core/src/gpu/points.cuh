@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Winding numbers of points around a closed mesh in the snapshot of a frame (solid/winding.cpp): each thread follows
-// the ray of one point.
+// Winding numbers and signed distances of points in the snapshot of a frame (solid/winding.cpp, nearest_face.cpp): one
+// thread for each point.
 #pragma once
 
 #include "gpu/bounds.cuh"
@@ -9,6 +9,7 @@
 #include "gpu/stages.cuh"
 #include "gpu/traverse.cuh"
 #include "solid/crossing.h"
+#include "solid/nearest_place.h"
 
 namespace hpccd::gpu {
 
@@ -85,6 +86,120 @@ __global__ void winding_kernel(const __grid_constant__ LaunchParams<T> params, P
   if (i >= task.n) return;
   const PointOnDevice point(task.points + 3 * i, SceneExtent(params.worlds[0]).map());
   task.numbers[i] = winding_on_device(params, task.mesh, point);
+}
+
+// The smallest and largest coordinates of a mesh's vertices. extent: zeros before.
+template <class T>
+__global__ void mesh_extent_kernel(const __grid_constant__ LaunchParams<T> params, PointsTask task) {
+  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < params.n_vertices; i += gridDim.x * blockDim.x) {
+    if (params.mesh_of_vertex[i] != task.mesh) continue;
+    for (int k = 0; k < 3; ++k) {
+      const double x = params.given_t0[3 * static_cast<u64>(i) + k];
+      low[k] = fmin(low[k], x), high[k] = fmax(high[k], x);
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    for (int d = 16; d > 0; d /= 2) {
+      low[k] = fmin(low[k], __shfl_xor_sync(all_lanes, low[k], d));
+      high[k] = fmax(high[k], __shfl_xor_sync(all_lanes, high[k], d));
+    }
+    if (lane_number() != 0 || low[k] > high[k]) continue;
+    atomicMax(&task.extent->extent_low[k], ~ordered_bits(low[k]));
+    atomicMax(&task.extent->extent_high[k], ordered_bits(high[k]));
+  }
+}
+
+// The nearest face, by branch and bound. Undecided: a needle may be as near, the face contains the point, or the point
+// is far away.
+template <class T>
+__device__ PointOnFace nearest_on_device(const LaunchParams<T>& params, u32 mesh, const PointOnDevice& point,
+                                         const SceneExtent& extent, const CoordinateMap& map) {
+  const double at[3] = {point.exact.x, point.exact.y, point.exact.z};
+  double most = 0, size = 0, away = 0;
+  for (int k = 0; k < 3; ++k) {
+    most = greater(most, greater(fabs(extent.low[k] - at[k]), fabs(extent.high[k] - at[k])));
+    size = greater(size, extent.high[k] - extent.low[k]);
+    away = greater(away, fabs(at[k] - (0.5 * extent.low[k] + 0.5 * extent.high[k])));
+  }
+  const double scale = scale_for(most);
+  PointOnFace best{undecided_distance, {}, no_mesh, 0};
+  if (away / far_away > size) return best;
+  // A mapped coordinate x is rounded by 2^-24 |x|, vertices are within 2.25, and a difference is rounded once more:
+  // 2^-23 (|x| + 2.25) along each axis.
+  float farthest = 0;
+  for (int k = 0; k < 3; ++k) farthest = fmaxf(farthest, fabsf(point.at[k]));
+  const double units = map.scale / scale, slack = 2.1e-7 * (double{farthest} + 2.25);
+
+  double least = INFINITY, limit = INFINITY;  // squares: of the distance, scaled, and of gaps of boxes that matter
+  u32 nearest = no_mesh;
+  bool certain = true;
+  const auto square_of_gap = [&](const DeviceBox& box) {
+    float s = 0;
+    for (int k = 0; k < 3; ++k) {
+      const float gap = fmaxf(fmaxf(box.low[0].x[k] - point.at[k], point.at[k] - box.high[0].x[k]), 0.0f);
+      s += gap * gap;
+    }
+    return s;
+  };
+  const auto scaled = [&](u32 number) {
+    const u32* f = params.faces + 3 * static_cast<u64>(number);
+    const SortedFace sorted(__ldg(f), __ldg(f + 1), __ldg(f + 2));
+    Vec3<double> corners[3];
+    for (int i = 0; i < 3; ++i) {
+      const Vec3<T> x = load_start(params.vertices, sorted.vertex[i]);
+      corners[i] = {x.x, x.y, x.z};
+    }
+    return ScaledFace(point.exact, scale, corners);
+  };
+  const auto consider = [&](u32 number) {
+    const ScaledFace face = scaled(number);
+    const PlaceOnFace place = face.nearest();
+    if (!place.certain) {
+      certain = certain && sqrt(place.square) - face.height_of_needle() - largest_scaled_error > sqrt(least);
+      return;
+    }
+    if (place.square > least || (place.square == least && number >= nearest)) return;
+    least = place.square, nearest = number;
+    const double reach = (sqrt(least) * (1 + 1e-9) + largest_scaled_error) * units + slack;
+    limit = reach * reach * (1 + 1e-6);
+  };
+
+  struct Pending {
+    u32 node;
+    float gap;
+  };
+  Pending stack[traverse_depth + 2];
+  u32 n_stack = 1;
+  stack[0] = {0, 0};
+#pragma unroll 1
+  while (n_stack > 0 && certain) {
+    const Pending next = stack[--n_stack];
+    const u32 of = params.node_mesh[next.node];
+    if (next.gap > limit || (of != no_mesh && of != mesh)) continue;
+    const DeviceBox box = load_box(&params.node_boxes[next.node]);
+    if (const u32 left = box.tag_low()) {
+      const Pending a{left, square_of_gap(load_box(&params.node_boxes[left]))};
+      const Pending b{left + 1, square_of_gap(load_box(&params.node_boxes[left + 1]))};
+      stack[n_stack++] = b.gap < a.gap ? a : b, stack[n_stack++] = b.gap < a.gap ? b : a;
+      continue;
+    }
+    const DeviceLeaf leaf = params.leaves[box.tag_high()];
+#pragma unroll 1
+    for (u32 i = 0; i < leaf.n_faces(); ++i) consider(params.leaf_faces[leaf.first_face + i].number);
+  }
+  if (!certain || !(least > 0) || nearest == no_mesh) return best;
+  const ScaledFace face = scaled(nearest);
+  return {sqrt(least) / scale, face.point_at(face.nearest()), nearest, 0};
+}
+
+template <class T>
+__global__ void nearest_kernel(const __grid_constant__ LaunchParams<T> params, PointsTask task) {
+  const u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x;
+  if (i >= task.n) return;
+  const CoordinateMap map = SceneExtent(params.worlds[0]).map();
+  const PointOnDevice point(task.points + 3 * i, map);
+  task.nearest[i] = nearest_on_device(params, task.mesh, point, SceneExtent(*task.extent), map);
 }
 
 }  // namespace hpccd::gpu

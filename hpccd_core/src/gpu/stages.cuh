@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "gpu/launch_params.cuh"
+#include "gpu/pipeline.h"
 #include "gpu/stream.h"
 
 namespace hpccd::gpu {
@@ -63,9 +64,12 @@ struct PointsTask {
   const double* points;  // x y z of each
   u64 n;
   u32 mesh;
-  std::int32_t* numbers;  // undecided_winding: only integers can decide
+  bool with_distances;
+  std::int32_t* numbers;
+  PointOnFace* nearest;   // for distances; without winding numbers
+  WorldCounters* extent;  // of the mesh
 };
 template <class T>
-void launch_winding_numbers(const LaunchParams<T>& params, const PointsTask& task, const Stages& stages);
+void launch_points(const LaunchParams<T>& params, const PointsTask& task, const Stages& stages);
 
 }  // namespace hpccd::gpu

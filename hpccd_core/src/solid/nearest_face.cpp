@@ -11,66 +11,7 @@
 namespace hpccd {
 namespace {
 
-// Beyond this many times its size, a mesh is searched from a nearer point in the same direction: the distances of its
-// faces then differ by less than their rounding errors.
-constexpr double far_away = 1e9, near_enough = 1e8;
-
-// A height of a face relative to its longest edge below which its normal is too inaccurate in double precision.
-constexpr double least_height = 1e-8;
-
-double square(const Vec3<double>& x) { return dot(x, x); }
-
-// The corners of a face in ascending order of their numbers: both faces of an edge compute the same distance from it.
-struct SortedFace {
-  std::uint32_t vertex[3];
-  explicit SortedFace(const std::array<std::uint32_t, 3>& f) : vertex{f[0], f[1], f[2]} {
-    if (vertex[0] > vertex[1]) std::swap(vertex[0], vertex[1]);
-    if (vertex[1] > vertex[2]) std::swap(vertex[1], vertex[2]);
-    if (vertex[0] > vertex[1]) std::swap(vertex[0], vertex[1]);
-  }
-};
-
-// Where a face is nearest to the origin: corner 0 plus x times its edge to corner 1, plus y times that to corner 2.
-struct PlaceOnFace {
-  double square;
-  double x, y;
-  bool certain = true;  // false: a needle, whose inside may be nearer than its border
-};
-
-// Rounding: with M the largest coordinate of q, an edge's nearest point has an error of a few 2^-53 M across the gap.
-// Inside, the gap from the border is projected on the normal n of direction error delta = 4 2^-53 / least_height at
-// most; the projection's error is delta^2 |gap| / 2 < 1e-15 M, and across the plane delta times the face's height,
-// which is below 2^-51 M.
-PlaceOnFace nearest_place(const Vec3<double> q[3], const Vec3<double> e[3]) {  // e: 0 to 1, 0 to 2, 1 to 2
-  PlaceOnFace best{square(q[0]), 0, 0};
-  Vec3<double> gap = q[0];
-  const auto keep = [&](const Vec3<double>& g, double x, double y) {
-    const double s = square(g);
-    if (s < best.square) best.square = s, best.x = x, best.y = y, gap = g;
-  };
-  keep(q[1], 1, 0);
-  keep(q[2], 0, 1);
-  double longest = 0;
-  for (int i = 0; i < 3; ++i) {
-    const Vec3<double>& from = q[i == 2];
-    const double along = 0 - dot(from, e[i]), length = square(e[i]);
-    longest = std::max(longest, length);
-    if (!(along > 0 && along < length)) continue;
-    const double t = along / length;
-    keep(from + t * e[i], i == 0 ? t : i == 1 ? 0 : 1 - t, i == 0 ? 0 : t);
-  }
-  const Vec3<double> n = cross(e[0], e[1]);
-  const double nn = square(n);
-  if (!(nn >= least_height * least_height * longest * longest && nn > 1e-280)) {
-    best.certain = !(longest > 0);
-    return best;
-  }
-  const double x = 0 - dot(cross(q[0], e[1]), n), y = 0 - dot(cross(e[0], q[0]), n);
-  if (!(x >= 0 && y >= 0 && x + y <= nn)) return best;
-  const double height = dot(gap, n), s = height * height / nn;
-  if (s < best.square) best = {s, x / nn, y / nn};
-  return best;
-}
+constexpr double near_enough = 1e8;  // see far_away
 
 template <class Real>
 Real beyond(Real low, Real high, Real at) {
@@ -172,7 +113,7 @@ void NearestFaceSearch::begin(const Vec3<double>& point) {
   double most = 0;
   for (int k = 0; k < 3; ++k)
     most = std::max({most, std::fabs(extent.low[k] - at[k]), std::fabs(extent.high[k] - at[k])});
-  scale_ = most > 0 ? std::ldexp(1.0, std::clamp(-std::ilogb(most), -1000, 1000)) : 1;
+  scale_ = scale_for(most);
 }
 
 NearestFace NearestFaceSearch::find(const Vec3<double>& point, std::uint32_t near) {
@@ -213,7 +154,7 @@ NearestFace NearestFaceSearch::find(const Vec3<double>& point, std::uint32_t nea
   }
 
   if (far) begin(point), square_ = square_of_distance(face_, INFINITY);
-  NearestFace found{std::sqrt(square_) / scale_, face_, nearest_point(face_), largest_error / scale_};
+  NearestFace found{std::sqrt(square_) / scale_, face_, nearest_point(face_), largest_scaled_error / scale_};
   if (found.distance == 0) {
     const std::array<std::uint32_t, 3>& f = mesh_.features.faces[face_];
     const Vec3<double> q[4] = {point, mesh_.position(f[0]), mesh_.position(f[1]), mesh_.position(f[2])};
@@ -233,39 +174,35 @@ void NearestFaceSearch::consider(std::uint32_t face) {
 // Faces at the same distance are still needed: one of them has the lowest number.
 void NearestFaceSearch::update_limit() {
   const double units = fine_.empty() ? mesh_.snapshot.map.scale / scale_ : 1;
-  const double distance = (std::sqrt(square_) * (1 + 1e-9) + largest_error) * units, limit = distance + slack_;
+  const double distance = (std::sqrt(square_) * (1 + 1e-9) + largest_scaled_error) * units, limit = distance + slack_;
   reach_ = distance + along_slack_;
   limit_ = limit * limit * (1 + 1e-6);  // the square of a gap is rounded in single precision
 }
 
-double NearestFaceSearch::square_of_distance(std::uint32_t face, double least) const {
-  const SortedFace f(mesh_.features.faces[face]);
-  const Vec3<double> at[3] = {mesh_.position(f.vertex[0]), mesh_.position(f.vertex[1]), mesh_.position(f.vertex[2])};
-  const Vec3<double> q[3] = {scaled(at[0]), scaled(at[1]), scaled(at[2])};
-  const Vec3<double> e[3] = {scale_ * (at[1] - at[0]), scale_ * (at[2] - at[0]), scale_ * (at[2] - at[1])};
-  const PlaceOnFace place = nearest_place(q, e);
+ScaledFace NearestFaceSearch::scaled(std::uint32_t face) const {
+  const auto& f = mesh_.features.faces[face];
+  const SortedFace sorted(f[0], f[1], f[2]);
+  const Vec3<double> at[3] = {mesh_.position(sorted.vertex[0]), mesh_.position(sorted.vertex[1]),
+                              mesh_.position(sorted.vertex[2])};
+  return {point_, scale_, at};
+}
+
+double NearestFaceSearch::square_of_distance(std::uint32_t number, double least) const {
+  const ScaledFace face = scaled(number);
+  const PlaceOnFace place = face.nearest();
   if (place.certain) return place.square;
-  // The inside of a needle is not nearer than its border by more than its height.
-  const double height = 2 * least_height * std::sqrt(std::max({square(e[0]), square(e[1]), square(e[2])}));
-  if (std::sqrt(place.square) - height - largest_error > std::sqrt(least)) return place.square;
-  const Vec3<double> pair[4] = {point_, at[0], at[1], at[2]};
+  if (std::sqrt(place.square) - face.height_of_needle() - largest_scaled_error > std::sqrt(least)) return place.square;
+  const Vec3<double> pair[4] = {point_, face.at[0], face.at[1], face.at[2]};
   const double exact = exact::distance(Kind::vertex_face, pair) * scale_;
   return exact * exact;
 }
 
-Vec3<double> NearestFaceSearch::nearest_point(std::uint32_t face) const {
-  const SortedFace f(mesh_.features.faces[face]);
-  const Vec3<double> at[3] = {mesh_.position(f.vertex[0]), mesh_.position(f.vertex[1]), mesh_.position(f.vertex[2])};
-  const Vec3<double> q[3] = {scaled(at[0]), scaled(at[1]), scaled(at[2])};
-  const Vec3<double> e[3] = {scale_ * (at[1] - at[0]), scale_ * (at[2] - at[0]), scale_ * (at[2] - at[1])};
-  const PlaceOnFace place = nearest_place(q, e);
-  if (!place.certain) {
-    const Vec3<double> pair[4] = {point_, at[0], at[1], at[2]};
-    return exact::nearest(Kind::vertex_face, pair).on_second;
-  }
-  if (place.x == 1) return at[1];
-  if (place.y == 1) return at[2];
-  return at[0] + place.x * (at[1] - at[0]) + place.y * (at[2] - at[0]);
+Vec3<double> NearestFaceSearch::nearest_point(std::uint32_t number) const {
+  const ScaledFace face = scaled(number);
+  const PlaceOnFace place = face.nearest();
+  if (place.certain) return face.point_at(place);
+  const Vec3<double> pair[4] = {point_, face.at[0], face.at[1], face.at[2]};
+  return exact::nearest(Kind::vertex_face, pair).on_second;
 }
 
 template <class Real>

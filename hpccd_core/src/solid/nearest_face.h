@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "solid/mesh_in_tree.h"
+#include "solid/nearest_place.h"
 
 namespace hpccd {
 
@@ -38,9 +39,6 @@ class NearestFaceSearch {
     double low[3], high[3];
   };
 
-  // Of a distance, times scale_: distances of the mesh's vertices are below 7 then.
-  static constexpr double largest_error = 1e-13;
-
   void begin(const Vec3<double>& point);
   void consider(std::uint32_t face);
   double square_of_distance(std::uint32_t face, double least) const;
@@ -54,7 +52,7 @@ class NearestFaceSearch {
   void search_leaf(std::uint32_t leaf, const Real (&at)[3]);
   void make_fine_boxes();
   void update_limit();
-  Vec3<double> scaled(const Vec3<double>& x) const { return scale_ * (x - point_); }
+  ScaledFace scaled(std::uint32_t face) const;
 
   const MeshInTree& mesh_;
   std::vector<Pending> stack_;

@@ -35,16 +35,6 @@ void read(const Real* x, std::size_t n, ThreadPool& pool, std::vector<Vec3<doubl
   if (!good) report_bad("points", x, n, largest_in_snapshot);
 }
 
-std::vector<Vec3<double>> checked_points(Positions points, ThreadPool& pool) {
-  std::vector<Vec3<double>> all;
-  resize(all, points.n, pool.cancellation());
-  if (points.is_double)
-    read(static_cast<const double*>(points.data), points.n, pool, all);
-  else
-    read(static_cast<const float*>(points.data), points.n, pool, all);
-  return all;
-}
-
 // Every third bit of the result is one of the lowest ten of x.
 std::uint32_t spread_bits(std::uint32_t x) {
   x = (x | x << 16) & 0x030000ff;
@@ -180,6 +170,16 @@ class Piece {
 };
 
 }  // namespace
+
+std::vector<Vec3<double>> checked_points(Positions points, ThreadPool& pool) {
+  std::vector<Vec3<double>> all;
+  resize(all, points.n, pool.cancellation());
+  if (points.is_double)
+    read(static_cast<const double*>(points.data), points.n, pool, all);
+  else
+    read(static_cast<const float*>(points.data), points.n, pool, all);
+  return all;
+}
 
 WindingNumbers winding_numbers(const MeshInTree& mesh, Positions given, ThreadPool& pool) {
   const std::vector<Vec3<double>> points = checked_points(given, pool);
