@@ -598,7 +598,8 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
   s["gpu_passes"] = passes_;
   s["gpu_segments"] = lists_.n_segments();
   s["gpu_bytes"] = scene_.bytes() + tree_.bytes() + positions_.bytes() + motion_.bytes() + leaf_pairs_.bytes() +
-                   lists_.bytes() + contacts_.bytes() + places_.bytes() + near_.bytes() + hints_.bytes() + points_.bytes();
+                   lists_.bytes() + contacts_.bytes() + places_.bytes() + near_.bytes() + hints_.bytes() +
+                   points_.bytes();
   if (for_earliest() || goal_ == Goal::near_list) s["near_pairs"] = near_.size();
   return s;
 }

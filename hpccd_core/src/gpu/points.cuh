@@ -46,7 +46,8 @@ __device__ bool for_faces_of_mesh(const LaunchParams<T>& params, u32 mesh, Meets
       const LeafFeature face = params.leaf_faces[leaf.first_face + i];
       Vec3<double> q[3];
       for (u32 j = 0; j < 3; ++j) {
-        const Vec3<T> x = load_start(params.vertices, params.corners[leaf.first_corner + (face.corners >> 8 * j & 0xFF)]);
+        const Vec3<T> x =
+            load_start(params.vertices, params.corners[leaf.first_corner + (face.corners >> 8 * j & 0xFF)]);
         q[j] = {x.x, x.y, x.z};
       }
       if (!test(face.number, q)) return false;

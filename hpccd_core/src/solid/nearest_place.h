@@ -40,7 +40,8 @@ struct PlaceOnFace {
 // Inside, the gap from the border is projected on the normal n of direction error delta = 4 2^-53 / least_height at
 // most; the projection's error is delta^2 |gap| / 2 < 1e-15 M, and across the plane delta times the face's height,
 // which is below 2^-51 M.
-HPCCD_HOST_DEVICE inline PlaceOnFace nearest_place(const Vec3<double> q[3], const Vec3<double> e[3]) {  // e: 0 to 1, 0 to 2, 1 to 2
+HPCCD_HOST_DEVICE inline PlaceOnFace nearest_place(const Vec3<double> q[3],
+                                                   const Vec3<double> e[3]) {  // e: 0 to 1, 0 to 2, 1 to 2
   PlaceOnFace best{square(q[0]), 0, 0};
   Vec3<double> gap = q[0];
   const auto keep = [&](const Vec3<double>& g, double x, double y) {
