@@ -21,6 +21,7 @@ from fuzz.questions import (
     SEPARATION,
     SIGNED,
     STEP,
+    TRANSLATION,
     WINDING,
 )
 
@@ -48,6 +49,7 @@ def n_batches(question):
         (MOTION, 20, 1),
         (WINDING, 150, 1),
         (SIGNED, 50, 1),
+        (TRANSLATION, 100, 1),
         (POINTS, 60, 1),
         pytest.param(STEP, 60, 2, marks=pytest.mark.long),
         pytest.param(MOTION, 100, 4, marks=pytest.mark.long),
@@ -259,6 +261,10 @@ def in_other_faces(found):
     return dataclasses.replace(found, faces=np.roll(found.faces, 1))
 
 
+def too_far(found):
+    return found * (1 + 1e-9)
+
+
 def later(found):
     return dataclasses.replace(found, outputs={**found.outputs, "edge_parameters": found.edge_parameters + 1e-9})
 
@@ -270,6 +276,7 @@ def later(found):
         (WINDING, "winding_numbers", beside_the_surface),
         (SIGNED, "signed_distances", beyond),
         (SIGNED, "signed_distances", in_other_faces),
+        (TRANSLATION, "separating_translation", too_far),
         (POINTS, "intersections", later),
     ],
 )
