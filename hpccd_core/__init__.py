@@ -24,7 +24,7 @@ from .prepared import PreparedDetection
 from .proximity import Gap, Intersections, Proximity
 from .results import OutputNotComputed
 from .scene import Scene
-from .solids import SignedDistances, closed
+from .solids import Penetration, SignedDistances, closed
 
 __all__ = [
     "Cancelled",
@@ -42,6 +42,7 @@ __all__ = [
     "InvalidArgument",
     "MeshFileError",
     "OutputNotComputed",
+    "Penetration",
     "PreparedDetection",
     "Proximity",
     "Scene",

@@ -122,9 +122,10 @@ class Detector(
     -----
     Queries of a motion: :meth:`detect`, :meth:`step`, :meth:`collision_free_step`, :meth:`collision_free_motion`.
     Queries of one frame: :meth:`proximity`, :meth:`intersections`, :meth:`distances`, :meth:`winding_numbers`,
-    :meth:`signed_distances`, :meth:`separating_translation`. All take positions and `stream` as :meth:`detect` does,
-    and raise the same errors. Calls from several threads wait for each other; only :meth:`cancel` does not. A child
-    process made by os.fork() cannot use a detector with more than one thread. Detectors cannot be pickled.
+    :meth:`signed_distances`, :meth:`separating_translation`, :meth:`penetration`. All take positions and `stream` as
+    :meth:`detect` does, and raise the same errors. Calls from several threads wait for each other; only :meth:`cancel`
+    does not. A child process made by os.fork() cannot use a detector with more than one thread. Detectors cannot be
+    pickled.
 
     Examples
     --------

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,3 +72,29 @@ class SignedDistances:
     def __repr__(self) -> str:
         inside: Any = np.count_nonzero(self.distance < 0)
         return f"SignedDistances({self.distance.size} points, {inside} inside)"
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Penetration:
+    """A translation that separates two meshes, made by :meth:`Detector.penetration`.
+
+    Attributes
+    ----------
+    translation : ndarray, shape (3,), float64
+        Of mesh a. Zero if the meshes are free of each other.
+    depth : float
+        Its length.
+    lower_bound : float
+        No shorter translation separates the meshes: the distance of the deepest vertex of either mesh inside the
+        closed other one from its surface. 0 without such a vertex.
+    kind : {"vertex-face", "edge-edge", ""}
+        The features that touch after the translation; empty if the meshes are free, or where fewer vertices touch.
+    features : tuple of int
+        Scene-wide: vertex and face, or the vertices of an edge of a and of an edge of b.
+    """
+
+    translation: NDArray[np.float64]
+    depth: float
+    lower_bound: float
+    kind: Literal["vertex-face", "edge-edge", ""]
+    features: tuple[int, ...]

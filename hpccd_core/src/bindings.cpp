@@ -468,6 +468,16 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
           },
           "vertices"_a, "mesh_a"_a, "mesh_b"_a, "direction"_a)
       .def(
+          "penetration",
+          [](Detector& d, const GivenPositions& vertices, std::uint32_t mesh_a, std::uint32_t mesh_b,
+             const std::optional<std::array<double, 3>>& start) {
+            const Penetration p = unlocked([&] { return d.penetration(vertices.positions, mesh_a, mesh_b, start); });
+            return py::make_tuple(
+                py::array_t<double>(3, p.translation.data()), p.depth, p.lower_bound, name_of(p.kind),
+                std::vector<std::uint32_t>(p.features.data(), p.features.data() + n_features(p.kind)));
+          },
+          "vertices"_a, "mesh_a"_a, "mesh_b"_a, "start"_a)
+      .def(
           "set_separation",
           [](Detector& d, std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {
             unlocked_if_busy(d, [&] { d.set_separation(mesh_a, mesh_b, separation); });

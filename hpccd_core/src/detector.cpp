@@ -464,6 +464,19 @@ double Detector::separating_translation(Positions vertices, std::uint32_t mesh_a
   });
 }
 
+Penetration Detector::penetration(Positions vertices, std::uint32_t mesh_a, std::uint32_t mesh_b,
+                                  const std::optional<std::array<double, 3>>& start) {
+  const StandardArithmetic arithmetic;
+  impl_->check_solids(mesh_a, mesh_b);
+  if (start && !std::ranges::all_of(*start, [](double x) { return std::isfinite(x); }))
+    throw InvalidArgument("start: must be finite; give the translation of the previous result");
+  std::optional<Vec3<double>> from;
+  if (start) from = {(*start)[0], (*start)[1], (*start)[2]};
+  return impl_->snapshot(vertices, [&](DetectionBackend& backend, Positions v, Counts&) {
+    return backend.penetration(v, {mesh_a, mesh_b}, from);
+  });
+}
+
 void Detector::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {
   const StandardArithmetic arithmetic;
   const std::size_t n = impl_->common.scene->meshes().size();

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -89,6 +90,13 @@ class HPCCD_API Detector {
   /// number is unknown or given twice, a mesh has no faces, the direction is zero or not finite, or for several worlds.
   double separating_translation(Positions vertices, std::uint32_t mesh_a, std::uint32_t mesh_b,
                                 const std::array<double, 3>& direction);
+  /// A short translation of mesh_a that frees it of mesh_b, in the sense of separating_translation: certainly free if
+  /// the positions of mesh_a plus the translation are rounded to doubles. Not always the shortest; lower_bound is the
+  /// depth of the deepest vertex of either mesh inside the other one, if that is closed. start: a translation near
+  /// which to search, as that of the frame before, instead of in all directions. The result depends on the arguments
+  /// only. Meshes and errors as separating_translation; also throws InvalidArgument if start is not finite.
+  Penetration penetration(Positions vertices, std::uint32_t mesh_a, std::uint32_t mesh_b,
+                          const std::optional<std::array<double, 3>>& start = {});
 
   /// As detect, proximity and intersections, with results on the device. Throws InvalidArgument unless
   /// Options::results_on_device is set. If the device fails, the CPU computes the results and they are copied to the

@@ -143,6 +143,16 @@ struct SignedDistances {
   std::vector<std::array<double, 3>> closest;  ///< the nearest point on that face
 };
 
+/// A translation that separates two meshes, and the depth at which they penetrate each other.
+struct Penetration {
+  std::array<double, 3> translation{};  ///< of mesh a; zero if the meshes are free of each other
+  double depth = 0;                     ///< its length
+  double lower_bound = 0;               ///< no shorter translation separates them
+  /// The features that touch after the translation; none where the meshes are free, or where fewer vertices touch.
+  GapKind kind = GapKind::none;
+  std::array<std::uint32_t, 4> features{};  ///< vertex and face, or two edges (of mesh a first), then zeros
+};
+
 /// Results in a GPU's memory, complete when the call returns. Rows and order are those of Contacts, Proximity and
 /// Intersections. Later calls do not write to the memory while `memory` is held; afterwards they reuse it. It may
 /// outlive the detector.

@@ -51,6 +51,10 @@ class DetectionBackend {
   virtual std::optional<double> separating_translation(Positions, std::array<std::uint32_t, 2>, const Vec3<double>&) {
     return std::nullopt;
   }
+  virtual std::optional<Penetration> penetration(Positions, std::array<std::uint32_t, 2>,
+                                                 const std::optional<Vec3<double>>&) {
+    return std::nullopt;
+  }
 
   // Adds the counts of the last step, and its stages on a device.
   virtual void count(std::map<std::string, std::uint64_t>& stats) const = 0;

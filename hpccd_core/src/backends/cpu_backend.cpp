@@ -9,6 +9,7 @@
 #include "contacts/intersections.h"
 #include "paper/primitive_pairs.h"
 #include "scene/edge_sample.h"
+#include "solid/penetration.h"
 #include "solid/points.h"
 #include "solid/translation.h"
 #include "traverse/leaf_hulls.h"
@@ -317,6 +318,13 @@ std::optional<double> CpuBackend::separating_translation(Positions vertices, std
   const double s = hpccd::separating_translation(moved_pair(vertices, meshes), direction);
   shared_.profiler.mark("translation");
   return s;
+}
+
+std::optional<Penetration> CpuBackend::penetration(Positions vertices, std::array<std::uint32_t, 2> meshes,
+                                                   const std::optional<Vec3<double>>& start) {
+  Penetration found = hpccd::penetration(moved_pair(vertices, meshes), start);
+  shared_.profiler.mark("translation");
+  return found;
 }
 
 // Pairs of features within a distance.

@@ -38,6 +38,8 @@ class CpuBackend final : public DetectionBackend {
   std::optional<SignedDistances> signed_distances(Positions vertices, Positions points, std::uint32_t mesh) override;
   std::optional<double> separating_translation(Positions vertices, std::array<std::uint32_t, 2> meshes,
                                                const Vec3<double>& direction) override;
+  std::optional<Penetration> penetration(Positions vertices, std::array<std::uint32_t, 2> meshes,
+                                         const std::optional<Vec3<double>>& start) override;
 
   // For several worlds: at the beginning of a call, and before and after each world. count() covers all worlds since
   // then.

@@ -44,6 +44,8 @@ Crossing crossing(const V q[4], const OddMantissa at[3][4], const int low[3]) {
   return {turn, turn * sign(dot(to[0], cross(to[1], to[2])))};
 }
 
+}  // namespace
+
 // Bits as in exact/intersection.cpp. Rarely needed: inlined, it would also make GCC 12 warn of sizes that do not occur.
 [[gnu::noinline]] Crossing crossing(const V q[4]) {
   OddMantissa at[3][4];
@@ -59,7 +61,6 @@ Crossing crossing(const V q[4], const OddMantissa at[3][4], const int low[3]) {
   return crossing<Big>(q, at, low);
 }
 
-}  // namespace
 }  // namespace exact
 
 namespace {

@@ -10,6 +10,7 @@
 #include "bvh/motion_bounds.h"
 #include "bvh/tree.h"
 #include "scene/features.h"
+#include "solid/crossing.h"
 
 namespace hpccd {
 
@@ -29,5 +30,10 @@ void winding_numbers(const Tree& tree, const MotionBounds& snapshot, const Featu
 // Of a point and a closed mesh in the snapshot to which the tree is fitted. Coordinates up to largest_in_snapshot.
 Winding winding_number(const Tree& tree, const MotionBounds& snapshot, const Features& features, std::uint32_t mesh,
                        const Vec3<double>& point);
+
+namespace exact {
+// solid/crossing.h in integers, certain for all points and corners.
+Crossing crossing(const Vec3<double> q[4]);
+}  // namespace exact
 
 }  // namespace hpccd

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Penetration: convex pairs against the oracle of all normals, and that every result is free by other queries."""
+
+import numpy as np
+import oracle
+import pytest
+
+import hpccd_core as hc
+
+TETRAHEDRON = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])
+
+
+def detector_of(*meshes, threads=1):
+    scene = hc.Scene()
+    for name, (vertices, faces) in zip("abcdefgh", meshes, strict=False):
+        scene.add_mesh(name, faces, n_vertices=len(vertices))
+    return hc.Detector(scene, backend="cpu", threads=threads)
+
+
+def penetration(a, b, **more):
+    detector = detector_of(a, b)
+    return detector.penetration(np.concatenate([a[0], b[0]]), "a", "b", **more)
+
+
+def is_free(a, b, translation):
+    """By intersections and winding numbers of all vertices."""
+    moved = a[0].astype(np.float64) + translation
+    detector, vertices = detector_of((moved, a[1]), b), np.concatenate([moved, b[0]])
+    hits = detector.intersections(vertices)
+    if (hits.mesh_a != hits.mesh_b).any():
+        return False
+    return not any(
+        hc.closed(faces) and detector.winding_numbers(vertices, points, name)[0].any()
+        for name, faces, points in (("a", a[1], b[0]), ("b", b[1], moved))
+    )
+
+
+def random_turn(rng):
+    q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    return q * np.sign(np.linalg.det(q))
+
+
+def convex(rng):
+    """A stretched and turned icosphere, box or tetrahedron: affine images of convex meshes."""
+    vertices, faces = (
+        hc.shapes.icosphere(rng.integers(1, 3)),
+        hc.shapes.box(),
+        (rng.normal(size=(4, 3)), TETRAHEDRON),
+    )[rng.integers(3)]
+    if len(vertices) == 4 and np.linalg.det(vertices[1:] - vertices[0]) < 0:
+        faces = faces[:, ::-1]
+    return vertices @ np.diag(rng.uniform(0.3, 1.5, 3)) @ random_turn(rng) + rng.normal(size=3) * 0.4, faces
+
+
+def torus(n, m, radius=1.0, tube=0.35):
+    u, v = (2 * np.pi * np.arange(k) / k for k in (n, m))
+    u, v = (x.ravel() for x in np.meshgrid(u, v, indexing="ij"))
+    ring = radius + tube * np.cos(v)
+    vertices = np.stack([ring * np.cos(u), ring * np.sin(u), tube * np.sin(v)], axis=1)
+    i, k = (x.ravel() for x in np.meshgrid(np.arange(n), np.arange(m), indexing="ij"))
+    a, b = i * m + k, (i + 1) % n * m + k
+    c, d = (i + 1) % n * m + (k + 1) % m, i * m + (k + 1) % m
+    return vertices, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).astype(np.uint32)
+
+
+def bumpy(frequency, rng):
+    vertices, faces = hc.shapes.icosphere(frequency)
+    k = rng.normal(size=(3, 3)) * 4
+    return vertices * (1 + 0.15 * np.sin(vertices @ k).sum(axis=1, keepdims=True) / 2), faces
+
+
+def test_convex_pairs():
+    rng = np.random.default_rng(12)
+    pairs = [(convex(rng), convex(rng)) for _ in range(250)]
+    expected = oracle.convex_depths(pairs)
+    ratios = []
+    for (a, b), true in zip(pairs, expected, strict=True):
+        p = penetration(a, b)
+        assert is_free(a, b, p.translation)
+        assert p.depth == pytest.approx(np.linalg.norm(p.translation), rel=1e-14)
+        assert p.lower_bound <= p.depth
+        if true == 0:
+            assert p.depth == 0
+            continue
+        assert p.lower_bound <= true
+        assert p.depth >= true * (1 - 1e-12)
+        ratios.append(p.depth / true)
+    assert len(ratios) > 150
+    assert np.mean(np.array(ratios) <= 1.001) >= 0.99, np.sort(ratios)[-10:]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_meshes_that_are_not_convex(seed):
+    rng = np.random.default_rng(seed)
+    for a, b in ((torus(24, 12), torus(24, 12)), (bumpy(6, rng), bumpy(5, rng)), (torus(16, 8), bumpy(4, rng))):
+        a = (a[0] @ random_turn(rng) + 0.4 * rng.normal(size=3), a[1])
+        p, q = penetration(a, b), penetration(b, a)
+        for (x, y), r in (((a, b), p), ((b, a), q), ((a, b), hc.Penetration(-q.translation, q.depth, 0, "", ()))):
+            assert is_free(x, y, r.translation * (1 + (1e-12 if r.kind == "" else 0)))
+            assert r.lower_bound <= r.depth
+        assert p.lower_bound == pytest.approx(q.lower_bound, rel=1e-9)
+        near = penetration(a, b, start=p.translation)
+        assert is_free(a, b, near.translation)
+        assert near.depth <= p.depth * 1.001
+
+
+def test_free_meshes_and_touching_ones():
+    box = hc.shapes.box()
+    far = (box[0] + [3, 0, 0], box[1])
+    p = penetration(box, far)
+    assert (p.depth, p.lower_bound, p.kind, p.features, p.translation.tolist()) == (0, 0, "", (), [0, 0, 0])
+    touching = (box[0] + [1, 0, 0], box[1])
+    p = penetration(box, touching)
+    assert 0 < p.depth < 1e-9 and is_free(box, touching, p.translation) and p.lower_bound == 0
+
+
+def test_contained_meshes_and_open_ones():
+    inner, outer = hc.shapes.box((1, 1, 1)), hc.shapes.box((4, 6, 8))
+    p = penetration(inner, outer)
+    assert p.depth == pytest.approx(2.5) and p.lower_bound == pytest.approx(2 - 0.5)
+    assert is_free(inner, outer, p.translation)
+    lid = outer[0], outer[1][1:]
+    assert penetration(inner, lid).depth == 0
+    through = (inner[0] + [2, 0, 0], inner[1])
+    p = penetration(through, lid)
+    assert p.lower_bound < p.depth <= 0.5 + 1e-9 and is_free(through, lid, p.translation)
+
+
+def test_features_carry_the_depth():
+    box = hc.shapes.box()
+    p = penetration((np.array([[0.1, 0.05, 0.4], [1, 0, 2], [-1, 1, 2], [-1, -1, 2]]), TETRAHEDRON), box)
+    assert p.kind == "vertex-face" and p.features[0] == 0 and p.depth == pytest.approx(0.1)
+    assert (np.concatenate([box[0]])[box[1][p.features[1] - 4], 2] == 0.5).all()
+
+
+@pytest.mark.parametrize("scale", [1e-290, 1e-3, 1e290])
+def test_scales_and_float32(scale):
+    a, b = hc.shapes.icosphere(2), hc.shapes.box()
+    b = (b[0] + 0.3, b[1])
+    expected = penetration(a, b)
+    p = penetration((scale * a[0], a[1]), (scale * b[0], b[1]))
+    assert p.depth == pytest.approx(scale * expected.depth, rel=1e-6)
+    single = [(x.astype(np.float32), f) for x, f in (a, b)]
+    assert is_free(*single, penetration(*single).translation)
+
+
+def test_deterministic():
+    a, b = bumpy(6, np.random.default_rng(1)), torus(20, 10)
+    vertices = np.concatenate([a[0], b[0]])
+    results = [detector_of(a, b, threads=threads).penetration(vertices, "a", "b") for threads in (1, 2, 1)]
+    assert len({(r.translation.tobytes(), r.lower_bound, r.features) for r in results}) == 1
+
+
+@pytest.mark.parametrize("start", [(0, np.nan, 1), (1, 0), "z"])
+def test_invalid_starts(start):
+    with pytest.raises((ValueError, TypeError), match="start"):
+        penetration(hc.shapes.box(), hc.shapes.box(), start=start)
