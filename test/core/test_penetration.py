@@ -4,6 +4,7 @@
 import numpy as np
 import oracle
 import pytest
+from fuzz.solid_scenes import TRANSLATION_SCENES, TRANSLATIONS
 
 import hpccd_core as hc
 
@@ -155,3 +156,23 @@ def test_deterministic():
 def test_invalid_starts(start):
     with pytest.raises((ValueError, TypeError), match="start"):
         penetration(hc.shapes.box(), hc.shapes.box(), start=start)
+
+
+@pytest.mark.parametrize("kind", TRANSLATIONS)
+def test_degenerate_scenes_of_any_scale(kind):
+    """Free by the oracle wherever the meshes are, and not longer than along an axis where rounding does not matter."""
+    scene = TRANSLATION_SCENES[kind]
+    first = len(scene.rest[0])
+    scenes = [generate(np.random.default_rng(5), 40) for generate in TRANSLATIONS[kind].values()]
+    detector = detector_of(*((rest, faces) for faces, rest in zip(*scene, strict=True)))
+    for vertices in np.concatenate(scenes)[:, :-1]:
+        p = detector.penetration(vertices, "a", "b")
+        assert p.lower_bound <= p.depth
+        moved = np.concatenate([vertices[:first] + p.translation, vertices[first:]])
+        counts = {"n_vertices": [first, len(vertices) - first], "no_self_collision": [0, 1], "threads": 1}
+        assert not len(oracle.intersections(moved, scene.faces, **counts))
+        assert not oracle.contained(list(zip(np.split(moved, [first]), scene.faces, strict=True)), 1).any()
+        axes = np.concatenate([np.eye(3), -np.eye(3)])
+        least = min(detector.separating_translation(vertices, "a", "b", axis) for axis in axes)
+        if 1e-300 < np.abs(vertices).max() < 1e6 * least:
+            assert p.depth <= least * (1 + 1e-6)

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "solid/free_place.h"
+#include "solid/translation.h"
 
 namespace hpccd {
 namespace {
@@ -188,6 +189,13 @@ class Search {
     return {depth * direction, depth, *end};
   }
 
+  // In a gap between contacts, the first one in a direction: a translation within a ring or an open box.
+  Place first_gap(const V& direction) const {
+    const ContactTime time = first_separation(Translation(pair_, direction));
+    if (!(time.at > 0)) return {};
+    return {time.at * direction, time.at, time};
+  }
+
   // From the last contact along the normal of its features, as long as that is nearer: for convex meshes the foot of a
   // perpendicular on a face of the obstacle.
   Place descend(Place place) const {
@@ -241,6 +249,7 @@ class Search {
 
 // The shortest multiple of a place, a little longer if needed, that is free after rounding.
 std::optional<V> certified(const MovedPair& pair, const Place& place) {
+  if (!(place.depth > 0)) return std::nullopt;  // by rounding: the meshes are not free where they are
   const double up = 1 / pair.scale();
   // Times are within 2e-14, rounded positions within 1e-16.
   for (double more = 4e-16; more < 1e-6; more *= 8) {
@@ -285,15 +294,20 @@ Penetration penetration(const MovedPair& pair, const std::optional<V>& start) {
   const auto add = [&](const V& direction) {
     if (const Place place = search.exit(direction); place.depth < INFINITY) places.push_back(place);
   };
+  const bool small = pair.a().faces.size() + pair.b().faces.size() < 2000;
+  const auto add_gap = [&](const V& direction) {  // decided exactly, which takes long for large meshes
+    if (const Place place = small ? search.first_gap(direction) : Place{}; place.depth < INFINITY)
+      places.push_back(place);
+  };
   const HullOfPlaces hull(pair);
   const double largest = start ? max_norm(*start) : 0;
   if (start && largest > 0) {
     const int top = std::ilogb(largest);
-    add(unit({std::ldexp(start->x, -top), std::ldexp(start->y, -top), std::ldexp(start->z, -top)}));
+    const V direction = unit({std::ldexp(start->x, -top), std::ldexp(start->y, -top), std::ldexp(start->z, -top)});
+    add(direction), add_gap(direction);
   }
   if (places.empty()) {
     // Of the hulls, to a thousandth; finer where that costs little.
-    const bool small = pair.a().faces.size() + pair.b().faces.size() < 2000;
     Directions directions(hull);
     directions.refine(0, 66);
     const std::size_t n_spread = directions.corners().size();
@@ -302,6 +316,7 @@ Penetration penetration(const MovedPair& pair, const std::optional<V>& start) {
     const auto nearer = [](const auto& x, const auto& y) { return x.distance < y.distance; };
     std::stable_sort(order.begin() + static_cast<std::ptrdiff_t>(n_spread), order.end(), nearer);
     for (std::size_t i = 0; i < std::min(n_spread + 16, order.size()); ++i) add(order[i].direction);
+    for (std::size_t i = 0; i < 6; ++i) add_gap(order[i].direction);  // along the axes
   }
   const auto shorter = [](const Place& x, const Place& y) { return x.depth < y.depth; };
   std::stable_sort(places.begin(), places.end(), shorter);

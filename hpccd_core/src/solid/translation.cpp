@@ -3,8 +3,7 @@
 
 namespace hpccd {
 
-double separating_translation(const MovedPair& pair, const Vec3<double>& direction) {
-  const Translation translation(pair, direction);
+ContactTime first_separation(const Translation& translation) {
   ContactTime time;
   for (;;) {
     // From one interval to the one of those at its end that lasts longest. Features take over from their neighbours at
@@ -13,11 +12,16 @@ double separating_translation(const MovedPair& pair, const Vec3<double>& directi
       if (translation.compare(*end, time) <= 0) break;
       time = *end;
     }
-    if (!translation.contained_after(time)) return translation.length(time);
+    if (!translation.contained_after(time)) return time;
     const auto next = translation.earliest_begin(time);
-    if (!next) return translation.length(time);
+    if (!next) return time;
     time = *next;
   }
+}
+
+double separating_translation(const MovedPair& pair, const Vec3<double>& direction) {
+  const Translation translation(pair, direction);
+  return translation.length(first_separation(translation));
 }
 
 }  // namespace hpccd

@@ -10,4 +10,8 @@ namespace hpccd {
 // meets mesh b nor is inside it nor contains it. Within 1e-14 of its size.
 double separating_translation(const MovedPair& pair, const Vec3<double>& direction);
 
+// The same for a translation along a direction, as the contact at its end; without features where nothing is in the
+// way.
+ContactTime first_separation(const Translation& translation);
+
 }  // namespace hpccd
