@@ -50,6 +50,7 @@ def n_batches(question):
         (WINDING, 150, 1),
         (SIGNED, 50, 1),
         (TRANSLATION, 100, 1),
+        (DEPTH, 100, 1),
         (POINTS, 60, 1),
         pytest.param(STEP, 60, 2, marks=pytest.mark.long),
         pytest.param(MOTION, 100, 4, marks=pytest.mark.long),
@@ -265,6 +266,14 @@ def too_far(found):
     return found * (1 + 1e-9)
 
 
+def too_short(found):
+    return dataclasses.replace(found, translation=found.translation * 0.99, depth=found.depth * 0.99)
+
+
+def too_sure(found):
+    return dataclasses.replace(found, lower_bound=found.depth * 1.1)
+
+
 def later(found):
     return dataclasses.replace(found, outputs={**found.outputs, "edge_parameters": found.edge_parameters + 1e-9})
 
@@ -277,6 +286,8 @@ def later(found):
         (SIGNED, "signed_distances", beyond),
         (SIGNED, "signed_distances", in_other_faces),
         (TRANSLATION, "separating_translation", too_far),
+        (DEPTH, "penetration", too_short),
+        (DEPTH, "penetration", too_sure),
         (POINTS, "intersections", later),
     ],
 )

@@ -34,7 +34,7 @@ from .steps import EARLY, contradict
 
 SIMD = ("scalar", "avx2", "avx512", "neon")
 QUESTIONS = (CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS, DISTANCES, STEP, MOTION)
-QUESTIONS += (CONTAINMENT, WINDING, SIGNED, TRANSLATION, POINTS)
+QUESTIONS += (CONTAINMENT, WINDING, SIGNED, TRANSLATION, DEPTH, POINTS)
 
 # Guarantee of `exact`: error of the time; error of the distance, relative to the size of the query.
 TOLERANCE = 1e-12
