@@ -105,7 +105,8 @@ def untangle(meshes, most_iterations):
             contours = hits.contours()
             length = sum(contour.length for contour in contours)
             print(
-                f"{iteration:5d}: {len(hits)} intersections, {len(contours)} contour{'s'[: len(contours) != 1]} of length {length:.3f}"
+                f"{iteration:5d}: {len(hits)} intersections, "
+                f"{len(contours)} contour{'s'[: len(contours) != 1]} of length {length:.3f}"
             )
         x = relax(x + displacements(hits, len(x), free, 0.2 * rest.mean()), edges, rest, free)
         hits = detector.intersections(x)
