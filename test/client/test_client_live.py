@@ -26,6 +26,7 @@ REQUEST = FOLDER / "ten_line_request.py"
 GOAL = FOLDER / "ten_line_goal.py"
 LINE_SEARCH = FOLDER / "ten_line_line_search.py"
 STOP = FOLDER / "ten_line_stop.py"
+SPEED_SCALE = FOLDER / "ten_line_speed_scale.py"
 PAGES = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
 FACES = np.array([[0, 1, 2], [3, 4, 5]])
 
@@ -162,11 +163,18 @@ def test_the_stop_listener_of_the_documentation(start, start_node):
     node.wait_until(lambda: said.read_text().endswith(f"stop: {node.namespace}/stop is true\n"), "silence")
 
 
+def test_the_speed_scale_listener_of_the_documentation(start, start_node):
+    node = start_node({"meshes": list(hand_and_table.MESHES), "stop_distance": 0.1, "approach_time": 1.0})
+    program, said = start(SPEED_SCALE, node.namespace)
+    node.wait_until(lambda: said.read_text().startswith("speed scale: 0.0 "), "0 before the first result")
+    assert program.poll() is None
+
+
 def test_the_documentation_shows_programs_that_are_run_here():
     """Each whole program in README and docs that uses the client is one of those above, to the letter, or has a file
     name: those run in test/packaging."""
     blocks = [block for page in PAGES for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)]
-    programs = (PUBLISHER, SUBSCRIBER, MARKER, REQUEST, GOAL, LINE_SEARCH, STOP)
+    programs = (PUBLISHER, SUBSCRIBER, MARKER, REQUEST, GOAL, LINE_SEARCH, STOP, SPEED_SCALE)
     run = [statements(program.read_text()) for program in programs]
     for block in blocks:
         if "client.prepare_environment()" in block and not re.match(r"# \w+\.py\n", block):
