@@ -122,7 +122,7 @@ class SolidQueries(SnapshotCalls):
         Returns
         -------
         float
-            The infimum of the s >= 0 for which a, moved by s * direction / |direction|, is free of b, in the unit of
+            The infimum of the s >= 0 for which a, moved by s along `direction`, is free of b, in the unit of
             the coordinates: within 1e-12 of its own size, above or below. At s they may touch.
 
         Raises

@@ -84,7 +84,7 @@ class HPCCD_API Detector {
   /// Signed distances of points to a mesh. Signs are exact; distances have errors of at most 1e-12 of the largest
   /// distance of the point from the mesh. Arguments and errors as winding_numbers.
   SignedDistances signed_distances(Positions vertices, Positions points, std::uint32_t mesh);
-  /// The least s >= 0 such that mesh_a, moved by s * direction / |direction|, is free of mesh_b: neither meets it nor
+  /// The least s >= 0 such that mesh_a, moved by s along direction, is free of mesh_b: neither meets it nor
   /// is inside it, if it is closed, nor contains it, if itself is closed. They may touch at s. Counts all faces of the
   /// two meshes, whether or not the scene enables the pair, and no separations. On the CPU. Throws InvalidArgument if a
   /// number is unknown or given twice, a mesh has no faces, the direction is zero or not finite, or for several worlds.
