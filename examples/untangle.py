@@ -135,7 +135,7 @@ def save_picture(path, name, meshes, x, first, last):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="*", default=["cloth", "sleeve"], help=f"of {', '.join(SCENES)}")
-    parser.add_argument("--iterations", type=int, default=500, help="at most so many (default: %(default)s)")
+    parser.add_argument("--iterations", type=int, default=500, help="limit of iterations (default: %(default)s)")
     parser.add_argument("--picture", action="store_true", help="write SCENE.png, before and after (needs hpccd)")
     options = parser.parse_args()
     if unknown := set(options.scenes) - set(SCENES):

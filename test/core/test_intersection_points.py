@@ -21,7 +21,7 @@ def incidence_of(s, weights):
 
 
 def assert_places(found, vertices, faces, most=None):
-    """Against rational arithmetic; of at most so many rows."""
+    """Against rational arithmetic; of at most `most` rows."""
     assert len(found.points) == len(found.edge_parameters) == len(found.weights) == len(found)
     assert (found.weights >= 0).all() and (found.weights <= 1).all()
     assert (found.edge_parameters >= 0).all() and (found.edge_parameters <= 1).all()
