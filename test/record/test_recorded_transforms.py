@@ -72,6 +72,9 @@ def of_geometry_msgs(node):
     return publisher.publish, static.publish
 
 
+of_geometry_msgs.names = ("transforms", "transforms_static")
+
+
 def of_tf2(node):
     tf2 = pytest.importorskip("tf2_msgs.msg", reason="tf2_msgs is not installed: /tf is not understood")
     publisher = node.peer.publisher(tf2.TFMessage, "/tf", qos.TRANSFORMS)
@@ -86,6 +89,9 @@ def compared(path):
     replay, steps = replayed(path)
     assert replay.diverged == 0, replay.first_divergence.difference
     return replay, steps
+
+
+of_tf2.names = ("/tf", "/tf_static")
 
 
 @pytest.mark.parametrize("topics", [of_geometry_msgs, of_tf2])
@@ -104,6 +110,7 @@ def test_verified_from_the_file(start_node, tmp_path, topics):
     topologies(node)
     stream(node, STEPS, *publishers)
     complete = {"meshes/cloth/vertices": STEPS, "meshes/net/vertices": STEPS, "contacts": STEPS - 1}
+    complete |= dict(zip(topics.names, (STEPS + 1, len(STATIC)), strict=True))
     node.wait_until(
         lambda: all(recorder.received[resolve(name)] == count for name, count in complete.items()), "other recording"
     )
