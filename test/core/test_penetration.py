@@ -105,6 +105,31 @@ def test_meshes_that_are_not_convex(seed):
         assert near.depth <= p.depth * 1.001
 
 
+def depth_of_vertices(detector, vertices, first):
+    """Of the deepest vertex of either mesh inside the other one, by signed distances of all."""
+    a, b = np.split(vertices, [first])
+    return max(0.0, *(-detector.signed_distances(vertices, x, m).distance.min() for x, m in ((a, "b"), (b, "a"))))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_lower_bound_is_the_depth_of_the_deepest_vertex(seed):
+    """Of meshes with several components, that intersect themselves and contain one another, turned inside out too."""
+    rng = np.random.default_rng(seed)
+
+    def parts(n):
+        meshes = [(torus(16, 8), bumpy(6, rng), convex(rng))[rng.integers(3)] for _ in range(n)]
+        turned = [v @ random_turn(rng) * rng.uniform(0.2, 1.5) + 0.5 * rng.normal(size=3) for v, _ in meshes]
+        firsts = np.cumsum([0] + [len(v) for v in turned[:-1]])
+        faces = np.concatenate([f + first for (_, f), first in zip(meshes, firsts, strict=True)])
+        return np.concatenate(turned), faces[:, ::-1] if rng.integers(4) == 0 else faces
+
+    for _ in range(8):
+        a, b = parts(rng.integers(1, 4)), parts(rng.integers(1, 4))
+        detector, vertices = detector_of(a, b), np.concatenate([a[0], b[0]])
+        p, expected = detector.penetration(vertices, "a", "b"), depth_of_vertices(detector, vertices, len(a[0]))
+        assert p.lower_bound == pytest.approx(expected, rel=1e-11, abs=1e-12) and p.lower_bound <= expected
+
+
 def test_free_meshes_and_touching_ones():
     box = hc.shapes.box()
     far = (box[0] + [3, 0, 0], box[1])

@@ -107,101 +107,154 @@ int winding_in(const BoxedMesh& mesh, const Moved& in_mesh, const V& point) {
   return winding;
 }
 
-// The square of the distance of a point from a triangle (Ericson, Real-Time Collision Detection, 5.1.5).
-double square_of_distance(const V& p, const V& a, const V& b, const V& c) {
-  const auto of_edge = [&](const V& from, const V& to) {
-    const V e = to - from, x = p - from;
-    const double length = dot(e, e), t = length > 0 ? std::clamp(dot(x, e) / length, 0.0, 1.0) : 0.0;
-    const V d = x - t * e;
-    return dot(d, d);
-  };
-  const V ab = b - a, ac = c - a, n = cross(ab, ac), x = p - a;
-  const double size = dot(n, n), v = dot(cross(x, ac), n), w = dot(cross(ab, x), n);
-  if (size > 0 && v >= 0 && w >= 0 && v + w <= size) {
-    const double height = dot(x, n);
-    return height * height / size;
-  }
-  return std::min({of_edge(a, b), of_edge(b, c), of_edge(c, a)});
-}
-
 double square_of_distance(const V& p, const BoxedMesh::Box& box) {
   const V d{std::max({box.low.x - p.x, p.x - box.high.x, 0.0}), std::max({box.low.y - p.y, p.y - box.high.y, 0.0}),
             std::max({box.low.z - p.z, p.z - box.high.z, 0.0})};
   return dot(d, d);
 }
 
-// In the scale of BoxedMesh.
-double distance_from(const MovedPair& pair, const BoxedMesh& mesh, const V& p) {
-  double best = INFINITY;
-  std::vector<std::pair<double, std::uint32_t>> heap;
-  const auto push = [&](std::uint32_t n) {
-    const double d = square_of_distance(p, mesh.nodes[n].box);
-    if (d < best) heap.emplace_back(-d, n), std::push_heap(heap.begin(), heap.end());
+// A point of a surface, and its distance from another point.
+struct NearPoint {
+  V at;
+  double distance;
+};
+
+// The point of a triangle that is nearest to p (Ericson, Real-Time Collision Detection, 5.1.5).
+V nearest_point(const V& p, const V& a, const V& b, const V& c) {
+  const V ab = b - a, ac = c - a, n = cross(ab, ac), x = p - a;
+  const double size = dot(n, n), v = dot(cross(x, ac), n), w = dot(cross(ab, x), n);
+  if (size > 0 && v >= 0 && w >= 0 && v + w <= size) return p - (dot(x, n) / size) * n;
+  V best = a;
+  double least = INFINITY;
+  const auto try_edge = [&](const V& from, const V& to) {
+    const V e = to - from;
+    const double length = dot(e, e), t = length > 0 ? std::clamp(dot(p - from, e) / length, 0.0, 1.0) : 0.0;
+    const V at = from + t * e, d = p - at;
+    if (const double square = dot(d, d); square < least) least = square, best = at;
   };
-  for (const std::uint32_t n : mesh.roots) push(n);
-  while (!heap.empty() && -heap.front().first < best) {
-    const BoxedMesh::Node& node = mesh.nodes[heap.front().second];
-    std::pop_heap(heap.begin(), heap.end());
-    heap.pop_back();
-    if (node.children) push(node.children), push(node.children + 1);
-    for (std::uint32_t i = node.first_face; i < node.end_face; ++i) {
-      const auto& f = mesh.faces[i];
-      best = std::min(best, square_of_distance(p, pair.position(f[0]), pair.position(f[1]), pair.position(f[2])));
-    }
-  }
-  return std::sqrt(best);
+  try_edge(a, b), try_edge(b, c), try_edge(c, a);
+  return best;
 }
 
-// By branch and bound over the boxes of vertices: the distance from the surface changes no faster than the place.
-double deepest_vertex(const MovedPair& pair, const BoxedMesh& inner, const BoxedMesh& outer) {
-  if (!outer.topology->closed || outer.roots.empty()) return 0;
+// The vertex of one mesh that is deepest inside another one, by branch and bound over the boxes of vertices: a point q
+// of the outer surface bounds the depth of all that is in a box by the distance of its farthest corner from q. Patches
+// around the deepest vertex are nearly perpendicular to the way to the surface, so this bound is much closer than the
+// distance of the middle plus the radius. All in the scale of BoxedMesh.
+class DeepestVertex {
+ public:
+  DeepestVertex(const MovedPair& pair, const BoxedMesh& inner, const BoxedMesh& outer)
+      : pair_(pair), inner_(inner), outer_(outer) {}
+
+  // If it is deeper than `best`; otherwise `best`.
+  double search(double best) {
+    best_ = best;
+    if (!outer_.topology->closed || outer_.roots.empty()) return best_;
+    for (const std::uint32_t n : inner_.roots) push(n, {INFINITY, n, {}, false});
+    std::uint32_t steps = 0;
+    while (!heap_.empty() && heap_.front().most > best_) {
+      if (++steps % 64 == 0) pair_.heed();
+      const Entry top = heap_.front();
+      std::pop_heap(heap_.begin(), heap_.end());
+      heap_.pop_back();
+      const BoxedMesh::Node& node = inner_.nodes[top.node];
+      if (node.children) push(node.children, top), push(node.children + 1, top);
+      for (std::uint32_t i = node.first_face; i < node.end_face; ++i)
+        for (const std::uint32_t v : inner_.faces[i]) consider(v, top);
+    }
+    return best_;
+  }
+
+ private:
   struct Entry {
-    double most;
-    std::uint32_t node;  // or, beyond all nodes, a vertex
-    bool is_vertex;
+    double most;  // depth
+    std::uint32_t node;
+    V near;  // a point of the outer surface
+    bool all_inside;
     bool operator<(const Entry& other) const { return most < other.most; }
   };
-  std::vector<Entry> heap;
-  const Moved at_rest{pair, {0, 0, 0}};
-  const auto overlaps_outer = [&](const BoxedMesh::Box& box) {
-    return std::ranges::any_of(outer.roots, [&](std::uint32_t n) { return overlap(box, outer.nodes[n].box); });
-  };
-  const auto push = [&](double most, std::uint32_t n, bool is_vertex) {
-    heap.push_back({most, n, is_vertex}), std::push_heap(heap.begin(), heap.end());
-  };
-  const auto push_node = [&](std::uint32_t n) {
-    const BoxedMesh::Box& box = inner.nodes[n].box;
-    if (!overlaps_outer(box)) return;
-    const V half = 0.5 * (box.high - box.low), middle = box.low + half;
-    const double distance = distance_from(pair, outer, middle), radius = 1.0000001 * std::sqrt(dot(half, half)) + 1e-15;
-    // No surface within the radius: all inside or all outside.
-    if (distance > radius && winding_in(outer, at_rest, (1 / pair.scale()) * middle) == 0) return;
-    push(distance + radius, n, false);
-  };
-  for (const std::uint32_t n : inner.roots) push_node(n);
-  while (!heap.empty()) {
-    const Entry top = heap.front();
-    std::pop_heap(heap.begin(), heap.end());
-    heap.pop_back();
-    if (top.is_vertex) {
-      // Distances are within 1e-15 of the coordinates, whose largest is below 1, and relatively within 1e-14.
-      if (winding_in(outer, at_rest, pair.given(top.node)) != 0) return std::max(0.0, top.most * (1 - 1e-13) - 2e-14);
-      continue;
-    }
-    pair.heed();
-    const BoxedMesh::Node& node = inner.nodes[top.node];
-    if (node.children) push_node(node.children), push_node(node.children + 1);
-    std::vector<std::uint32_t> vertices;
-    for (std::uint32_t i = node.first_face; i < node.end_face; ++i)
-      vertices.insert(vertices.end(), inner.faces[i].begin(), inner.faces[i].end());
-    std::ranges::sort(vertices);
-    vertices.erase(std::ranges::unique(vertices).begin(), vertices.end());
-    for (const std::uint32_t v : vertices)
-      if (overlaps_outer({pair.position(v), pair.position(v)}))
-        push(distance_from(pair, outer, pair.position(v)), v, true);
+
+  bool overlaps_outer(const BoxedMesh::Box& box) const {
+    return std::ranges::any_of(outer_.roots, [&](std::uint32_t n) { return overlap(box, outer_.nodes[n].box); });
   }
-  return 0;
-}
+  bool inside(const V& given) const { return winding_in(outer_, {pair_, {0, 0, 0}}, given) != 0; }
+
+  void consider(std::uint32_t vertex, const Entry& of) {
+    const V x = pair_.position(vertex);
+    if (!overlaps_outer({x, x}) || length(x - of.near) <= best_) return;
+    const double distance = nearest(x, {of.near, length(x - of.near)}, 0, best_).distance;
+    if (distance > best_ && (of.all_inside || inside(pair_.given(vertex)))) best_ = distance;
+  }
+
+  void push(std::uint32_t n, const Entry& parent) {
+    const BoxedMesh::Box& box = inner_.nodes[n].box;
+    if (!overlaps_outer(box)) return;
+    const auto most_from = [&](const V& q) {
+      const auto most = [](double low, double high, double at) { return std::max(high - at, at - low); };
+      return length(
+          {most(box.low.x, box.high.x, q.x), most(box.low.y, box.high.y, q.y), most(box.low.z, box.high.z, q.z)});
+    };
+    const bool first = parent.most == INFINITY;
+    Entry entry{first ? parent.most : std::min(parent.most, most_from(parent.near)), n, parent.near, parent.all_inside};
+    if (entry.most <= best_) return;
+    const V half = 0.5 * (box.high - box.low), middle = box.low + half;
+    const double radius = 1.0000001 * length(half) + 1e-15, slack = 0.25 * radius;
+    const NearPoint q = nearest(
+        middle, first ? NearPoint{{}, INFINITY} : NearPoint{parent.near, length(middle - parent.near)}, slack, 0);
+    entry.near = q.at, entry.most = std::min(entry.most, most_from(q.at));
+    if (entry.most <= best_) return;
+    // No surface within the radius: all inside or all outside.
+    if (!entry.all_inside && q.distance - slack > radius) {
+      if (!inside((1 / pair_.scale()) * middle)) return;
+      entry.all_inside = true;
+    }
+    heap_.push_back(entry), std::push_heap(heap_.begin(), heap_.end());
+  }
+
+  // A point of the outer surface that is at most `slack` farther than the nearest one, or nearer than `enough`. best: a
+  // point to begin with, if any.
+  NearPoint nearest(const V& p, NearPoint best, double slack, double enough) {
+    double limit = 0, square = best.distance * best.distance;
+    const auto set_limit = [&] {
+      const double d = best.distance - slack;
+      limit = d > 0 ? d * d : 0;
+    };
+    set_limit();
+    stack_.clear();
+    const auto visit = [&](std::uint32_t n) {
+      if (const double d = square_of_distance(p, outer_.nodes[n].box); d < limit) stack_.emplace_back(d, n);
+    };
+    for (const std::uint32_t n : outer_.roots) visit(n);
+    while (!stack_.empty()) {
+      const auto [gap, n] = stack_.back();
+      stack_.pop_back();
+      if (gap >= limit) continue;
+      const BoxedMesh::Node& node = outer_.nodes[n];
+      if (node.children) {
+        double x = square_of_distance(p, outer_.nodes[node.children].box);
+        double y = square_of_distance(p, outer_.nodes[node.children + 1].box);
+        const bool swap = x < y;
+        if (std::max(x, y) < limit) stack_.emplace_back(std::max(x, y), node.children + swap);
+        if (std::min(x, y) < limit) stack_.emplace_back(std::min(x, y), node.children + !swap);
+        continue;
+      }
+      for (std::uint32_t i = node.first_face; i < node.end_face; ++i) {
+        const auto& f = outer_.faces[i];
+        const V q = nearest_point(p, pair_.position(f[0]), pair_.position(f[1]), pair_.position(f[2])), d = p - q;
+        if (const double s = dot(d, d); s < square) square = s, best = {q, std::sqrt(s)}, set_limit();
+      }
+      if (best.distance <= enough) break;
+    }
+    return best;
+  }
+
+  static double length(const V& x) { return std::sqrt(dot(x, x)); }
+
+  const MovedPair& pair_;
+  const BoxedMesh &inner_, &outer_;
+  double best_ = 0;
+  std::vector<Entry> heap_;
+  std::vector<std::pair<double, std::uint32_t>> stack_;
+};
 
 }  // namespace
 
@@ -217,7 +270,10 @@ bool is_free(const MovedPair& pair, const V& translation) {
 }
 
 double deepest_vertex(const MovedPair& pair) {
-  return std::max(deepest_vertex(pair, pair.a(), pair.b()), deepest_vertex(pair, pair.b(), pair.a())) / pair.scale();
+  const double in_b = DeepestVertex(pair, pair.a(), pair.b()).search(0);
+  const double depth = DeepestVertex(pair, pair.b(), pair.a()).search(in_b);
+  // Distances are within 1e-15 of the coordinates, whose largest is below 1, and relatively within 1e-14.
+  return std::max(0.0, depth * (1 - 1e-13) - 2e-14) / pair.scale();
 }
 
 }  // namespace hpccd
