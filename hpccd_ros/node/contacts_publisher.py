@@ -1,22 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Publishes the results of a step: contacts; on request smallest distances, summaries of pairs of meshes, and messages
-for viewers."""
+"""Publishes the results of a step: contacts; on request smallest distances, and summaries of pairs of meshes."""
 
-import time
 from typing import Any
 
-import numpy as np
 from hpccd.msg import ContactArray, DistanceArray, PairSummary, PairSummaryArray
-from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
-from visualization_msgs.msg import MarkerArray
 
 from hpccd_ros.detect.pair_summary import summarise
 from hpccd_ros.detect.step_detector import Detection
 from hpccd_ros.frames.taken_inputs import TakenInputs
 from hpccd_ros.middleware import contact_messages, fields, qos, result_fields, snapshot_messages, topic_names
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
-from hpccd_ros.node.markers import contact_markers, surface_cloud
 
 
 class ContactsPublisher:
@@ -28,9 +22,6 @@ class ContactsPublisher:
         self._contacts = node.configured_publisher(ContactArray, topic_names.CONTACTS, profile)
         self._distances = node.configured_publisher(DistanceArray, topic_names.DISTANCES, qos.DISTANCES)
         self._pairs = node.configured_publisher(PairSummaryArray, topic_names.PAIRS, qos.PAIRS)
-        self._markers = node.configured_publisher(MarkerArray, topic_names.MARKERS, qos.MARKERS)
-        self._surface = node.configured_publisher(PointCloud2, topic_names.SURFACE, qos.MARKERS)
-        self._show_after = 0.0
 
     @property
     def topic(self) -> str:
@@ -83,25 +74,3 @@ class ContactsPublisher:
     def _publish_pairs(self, found: Detection, header: Header) -> None:
         pairs = [PairSummary(**vars(pair)) for pair in summarise(found)]
         self._pairs.publish(PairSummaryArray(header=header, step=found.end.step, pairs=pairs))
-
-    def show(self, found: Detection, header: Header) -> None:
-        """Publish for viewers, if parameter markers is set, at the requested rate at most."""
-        now = time.monotonic()
-        # A step that was under way when markers were asked for has none of what they show.
-        shown = self._settings["markers"] and {"points", "normals"} <= set(found.options.outputs)
-        if not shown or now < self._show_after:
-            return
-        self._show_after = now + 1.0 / self._settings["markers_rate"]
-        self._surface.publish(surface_cloud(found.end.vertices, header))
-        self._markers.publish(
-            contact_markers(
-                np.asarray(found.contacts.points),
-                np.asarray(found.contacts.normals),
-                getattr(found.contacts, "closest", np.empty((0, 2, 3))),  # computed only with a separation
-                len(found.contacts.vf),
-                stamp=header.stamp,
-                frame_id=header.frame_id,
-                size=self._settings["markers_size"],
-                limit=self._settings["markers_max"],
-            )
-        )

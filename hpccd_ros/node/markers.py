@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages for RViz and Foxglove: contacts as markers, limited in number so that viewers keep up, and vertices."""
+"""Messages for RViz and Foxglove: contacts, intersection curves and depths as markers, limited in number so that
+viewers keep up, and vertices."""
 
 from collections.abc import Sequence
 
@@ -10,6 +11,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
+from hpccd_ros.detect.interpenetration import Depth
 from hpccd_ros.middleware import fields
 
 # Colour-blind safe pair (Okabe and Ito): vertex-face orange, edge-edge blue.
@@ -17,6 +19,9 @@ _VERTEX_FACE = ColorRGBA(r=0.90, g=0.62, b=0.0, a=1.0)
 _EDGE_EDGE = ColorRGBA(r=0.0, g=0.45, b=0.70, a=1.0)
 # From the same palette: sky blue.
 _NEAR = ColorRGBA(r=0.34, g=0.71, b=0.91, a=1.0)
+# Vermillion, and reddish purple.
+_INTERSECTION = ColorRGBA(r=0.84, g=0.37, b=0.0, a=1.0)
+_DEPTH = ColorRGBA(r=0.80, g=0.47, b=0.65, a=1.0)
 _NORMAL_LENGTH = 10.0  # in point diameters
 
 
@@ -56,6 +61,27 @@ def contact_markers(
     gaps = (closest[chosen] if len(closest) else closest).reshape(-1, 3)
     near = _marker(3, "near", Marker.LINE_LIST, stamp, frame_id, 0.2 * size, _NEAR, gaps)
     return MarkerArray(markers=[*spheres, normal, near])
+
+
+def intersection_marker(lines: Sequence[np.ndarray], *, stamp: Time, frame_id: str, size: float) -> Marker:
+    """lines: (n,3) each, the points of a polyline. Without any, it deletes the last one."""
+    ends = [np.repeat(line, 2, axis=0)[1:-1] for line in lines]
+    points = np.concatenate(ends) if ends else np.empty((0, 3))
+    return _marker(4, "intersections", Marker.LINE_LIST, stamp, frame_id, 0.3 * size, _INTERSECTION, points)
+
+
+def depth_markers(depths: Sequence[Depth], *, stamp: Time, frame_id: str, size: float, count: int) -> list[Marker]:
+    """An arrow for each depth, numbered from 0, from its start to its end. count: how many markers are made at least;
+    those without a depth delete the arrows of that number."""
+    markers = []
+    for number in range(max(len(depths), count)):
+        ends = np.stack([depths[number].start, depths[number].end]) if number < len(depths) else np.empty((0, 3))
+        marker = _marker(number, "depth", Marker.ARROW, stamp, frame_id, 0.4 * size, _DEPTH, ends)
+        # Diameters of shaft and head; the head is not longer than half of a short arrow.
+        marker.scale.y = size
+        marker.scale.z = min(1.5 * size, 0.5 * depths[number].length) if len(ends) else 0.0
+        markers.append(marker)
+    return markers
 
 
 def surface_cloud(vertices: Sequence[np.ndarray], header: Header) -> PointCloud2:

@@ -21,6 +21,7 @@ from hpccd_ros.node.status_report import Reporter
 from hpccd_ros.node.stop_watch import StopWatch
 from hpccd_ros.node.stream_detection import StreamDetection
 from hpccd_ros.node.unknown_meshes import UnknownMeshWatch
+from hpccd_ros.node.viewer_publisher import ViewerPublisher
 from hpccd_ros.node.warning_log import WarningLog
 
 # s. At this interval the pages that a message allocates again cost little; a node that once held much, because its
@@ -52,6 +53,7 @@ class HpccdNode(GuardedLifecycleNode):
         self._robots: RobotDescriptions | None = None
         self._stream: StreamDetection | None = None  # none for a node without meshes and robots
         self._scene_error = ""  # why robots that are known make no scene
+        self._viewers: ViewerPublisher | None = None
         self._stop_watch: StopWatch | None = None
         self._unknown: UnknownMeshWatch | None = None
         self._jobs: DetectJobs | None = None
@@ -62,6 +64,7 @@ class HpccdNode(GuardedLifecycleNode):
         """Read mesh files, create publishers, service, action and diagnostics."""
         settings = self._settings
         self._contacts = ContactsPublisher(self, settings)
+        self._viewers = ViewerPublisher(self, settings)
         try:
             self._robots = RobotDescriptions(self, settings, self._follow_robots, self._doubt_robots)
             self._make_scene()
@@ -153,6 +156,8 @@ class HpccdNode(GuardedLifecycleNode):
             self._stop_watch.end()
         if self._stream is not None:
             self._stream.close()
+        if self._viewers is not None:
+            self._viewers.end()
         self._recording.end()
 
     def _release(self) -> None:
@@ -190,7 +195,7 @@ class HpccdNode(GuardedLifecycleNode):
         dropped = self._accounts.dropped.most_of(self._deforming)
         message = self._contacts.publish(found, dropped, self._accounts.inputs)
         self._accounts.processed(found, message.total, len(message.kind))
-        self._contacts.show(found, message.header)
+        self._viewers.show(found, message.header, self._builder)
 
     def _give_back(self) -> None:
         self._jobs.forget_scenes(unused_for=GIVE_BACK_EVERY)

@@ -342,7 +342,31 @@ OUTPUT_ROWS = (
         "Publish contact points and normals on markers, and vertices on surface, for viewers",
         change=ALWAYS,
     ),
-    Row("markers_max", "int", 2000, "Most contacts drawn, sampled evenly", span=(1, 1_000_000), change=ALWAYS),
+    Row(
+        "markers_depth",
+        "bool",
+        False,
+        "With markers: an arrow for each pair of meshes that intersect or contain one another: the shortest "
+        "translation found that frees the first mesh of the second one. Computed in a thread of its own, for tens of "
+        "ms to more than a second for each pair; frames that come meanwhile are not shown",
+        change=ALWAYS,
+    ),
+    Row(
+        "markers_intersections",
+        "bool",
+        True,
+        "With markers: intersection curves, between meshes and within them. Computed in a thread of its own, once for "
+        "each message of markers, if it has subscribers",
+        change=ALWAYS,
+    ),
+    Row(
+        "markers_max",
+        "int",
+        2000,
+        "Most contacts drawn, sampled evenly, and most points of intersection curves",
+        span=(1, 1_000_000),
+        change=ALWAYS,
+    ),
     Row(
         "markers_rate", "float", 10.0, "Most marker messages per second", unit="Hz", span=(0.001, 1000.0), change=ALWAYS
     ),
@@ -350,7 +374,7 @@ OUTPUT_ROWS = (
         "markers_size",
         "float",
         0.01,
-        "Diameter of a point; normals are ten times as long",
+        "Diameter of a point and of the heads of arrows; normals are ten times as long",
         unit="unit of the vertices",
         span=(1e-9, 1e9),
         change=ALWAYS,

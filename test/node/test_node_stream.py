@@ -250,7 +250,7 @@ def test_markers_on_request(start_node):
     message = node.contacts(1)[0]
     assert len(message.points) == 0, "the contacts carry points only where asked for (outputs)"
     (array,) = node.wait_until(lambda: markers, "markers")
-    vertex_face, edge_edge, normals, _ = array.markers
+    vertex_face, edge_edge, normals, *_ = array.markers
     assert len(vertex_face.points) + len(edge_edge.points) == 20 and len(normals.points) == 40
     assert vertex_face.header.frame_id == "world" and vertex_face.scale.x == 0.5
     (surface,) = node.wait_until(lambda: surfaces, "vertices for viewers")

@@ -9,7 +9,7 @@ import yaml
 from waving_sheet import sheet_faces, sheet_positions
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
-NAMESPACES = {"vertex_face", "edge_edge", "normals", "near"}
+NAMESPACES = {"vertex_face", "edge_edge", "normals", "near", "intersections", "depth"}
 CLASSES = {"PointCloud2": "sensor_msgs/msg/PointCloud2", "MarkerArray": "visualization_msgs/msg/MarkerArray"}
 
 

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the meshes of a frame intersect, and the translations that separate those that do. No ROS."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+import hpccd_core as hc
+from hpccd_ros.detect.core import Cancellation
+from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.frames.types import Topology
+
+
+@dataclass(frozen=True, eq=False)
+class Depth:
+    """How far ``mesh_a`` must move to be free of ``mesh_b``: the shortest translation found.
+
+    ``start``: (3,) the point of mesh a that touches mesh b after the translation, before it. Where the core names no
+    features, the middle of their intersection curves; inside a mesh, the middle of mesh a.
+    """
+
+    mesh_a: str
+    mesh_b: str
+    start: np.ndarray
+    translation: np.ndarray
+
+    @property
+    def end(self) -> np.ndarray:
+        return self.start + self.translation
+
+    @property
+    def length(self) -> float:
+        return float(np.linalg.norm(self.translation))
+
+
+class InterpenetrationDetector:
+    """Keeps scenes and detectors from frame to frame while topologies stay the same. All features are tested.
+
+    threads: of the core; 0: all. cancellation: its ``cancel`` makes the calls raise hc.Cancelled.
+    """
+
+    def __init__(self, builder: SceneBuilder, *, threads: int = 0, cancellation: Cancellation | None = None) -> None:
+        self._builder = SceneBuilder(builder.meshes, builder.ignored_pairs)
+        self._numbers = {mesh.name: number for number, mesh in enumerate(builder.meshes)}
+        self._options = {"outputs": ("points",), "backend": "cpu", "threads": threads}
+        self._cancellation = cancellation or Cancellation()
+        named = [(self._numbers[a], self._numbers[b]) for a, b in self._builder.pairs]
+        self._pairs = np.array(named, np.int64).reshape(-1, 2)  # the lower number first
+        self._topologies: tuple[Topology, ...] = ()
+        self._closed: np.ndarray | None = None
+        self._surfaces: hc.Detector | None = None  # within meshes, too
+        self._solids: hc.Detector | None = None  # made for the first depth
+
+    def intersections(self, topologies: tuple[Topology, ...], vertices: Sequence[np.ndarray]) -> hc.Intersections:
+        """The edges that intersect faces, with points. vertices: of each mesh. Raises the core's errors."""
+        self._prepare(topologies)
+        return self._surfaces.intersections(_concatenated(vertices))
+
+    def depths(
+        self, topologies: tuple[Topology, ...], vertices: Sequence[np.ndarray], hits: hc.Intersections
+    ) -> list[Depth]:
+        """Of the pairs of different meshes that intersect in ``hits``, or of which one is inside the other, closed one.
+        Where mesh a is static, mesh b moves instead. Raises the core's errors."""
+        self._prepare(topologies)
+        x = _concatenated(vertices)
+        solid = [number for number, topology in enumerate(topologies) if len(topology.faces)]
+        a, b = (np.asarray(side, np.int64) for side in (hits.mesh_a, hits.mesh_b))
+        meeting = {tuple(sorted(pair)) for pair in np.unique(np.stack([a, b], axis=1), axis=0).tolist()}
+        pairs = sorted(pair for pair in meeting if pair[0] != pair[1] and set(pair) <= set(solid))
+        if self._may_contain(vertices, meeting):
+            self._prepare_solids()
+            gaps = [gap for gap in self._solids.distances(x) if gap.inside]
+            pairs += [(self._numbers[gap.mesh_a], self._numbers[gap.mesh_b]) for gap in gaps]
+        found = (self._depth(x, vertices, hits, pair) for pair in pairs)
+        return [depth for depth in found if depth.length > 0]
+
+    def _prepare(self, topologies: tuple[Topology, ...]) -> None:
+        if self._surfaces is None or topologies != self._topologies:
+            scene = self._builder.build(topologies)
+            self._surfaces = self._cancellation.guard(hc.Detector(scene, **self._options))
+            self._topologies, self._solids, self._closed = topologies, None, None
+
+    def _prepare_solids(self) -> None:
+        if self._solids is None:
+            scene = self._builder.between_meshes.build(self._topologies)
+            self._solids = hc.Detector(scene, **self._options)
+            self._cancellation.guard(self._surfaces, self._solids)
+
+    def _may_contain(self, vertices: Sequence[np.ndarray], meeting: set[tuple[int, ...]]) -> bool:
+        """Whether the boxes of two meshes overlap of which one is closed, and which do not intersect."""
+        if self._closed is None:
+            self._closed = np.array([len(t.faces) > 0 and hc.closed(t.faces) for t in self._topologies])
+        low, high = np.full((2, len(vertices), 3), np.nan)  # of no vertices: overlaps nothing
+        for number, of_mesh in enumerate(vertices):
+            if len(of_mesh):
+                low[number], high[number] = np.min(of_mesh, axis=0), np.max(of_mesh, axis=0)
+        a, b = self._pairs.T
+        overlap = ((low[a] <= high[b]) & (low[b] <= high[a])).all(axis=1) & (self._closed[a] | self._closed[b])
+        return any(pair not in meeting for pair in map(tuple, self._pairs[overlap].tolist()))
+
+    def _depth(self, x: np.ndarray, vertices, hits: hc.Intersections, pair: tuple[int, int]) -> Depth:
+        meshes = self._builder.meshes
+        a, b = reversed(pair) if meshes[pair[0]].static else pair
+        self._prepare_solids()
+        found = self._solids.penetration(x, a, b)
+        first = sum(len(v) for v in vertices[:a])
+        start = _touching(x, hits.faces, found, range(first, first + len(vertices[a])))
+        if start is None:
+            of_pair = (np.sort(np.stack([hits.mesh_a, hits.mesh_b], axis=1), axis=1) == sorted(pair)).all(axis=1)
+            around = hits.points[of_pair] if of_pair.any() else np.asarray(vertices[a], np.float64)
+            start = 0.5 * around.min(axis=0) + 0.5 * around.max(axis=0)
+        return Depth(meshes[a].name, meshes[b].name, start, found.translation)
+
+
+def _concatenated(vertices: Sequence[np.ndarray]) -> np.ndarray:
+    return np.concatenate([np.asarray(v, np.float64) for v in vertices])
+
+
+def _touching(x: np.ndarray, faces: np.ndarray, found: hc.Penetration, of_a: range) -> np.ndarray | None:
+    """The point of mesh a that touches mesh b after the translation, before it; None without features."""
+    if found.kind == "vertex-face":
+        vertex, _ = found.features
+        return x[vertex] if vertex in of_a else x[vertex] - found.translation
+    if found.kind == "edge-edge":
+        a0, a1, b0, b1 = x[list(found.features)]
+        # The nearest points of two lines that meet, but for rounding; the clip is for nearly parallel edges.
+        along = np.stack([a1 - a0, b0 - b1], axis=1)
+        s = np.linalg.lstsq(along, b0 - a0 - found.translation, rcond=None)[0][0]
+        return a0 + np.clip(s, 0.0, 1.0) * (a1 - a0)
+    return None
+
+
+def polylines(contours: Sequence[hc.Contour], most: int) -> list[np.ndarray]:
+    """[(n,3)] of contours of more than one point, closed ones with their first point at the end.
+
+    most: points of all; where there are more, every k-th of each is kept, and its ends. The longest stay where that
+    would not suffice.
+    """
+    lines = [np.concatenate([c.points, c.points[: int(c.closed)]]) for c in contours if len(c) > 1]
+    if 2 * len(lines) > most:
+        longest = sorted(range(len(lines)), key=lambda k: -len(lines[k]))[: most // 2]
+        lines = [lines[k] for k in sorted(longest)]
+    counts = np.array([len(line) - 1 for line in lines], np.int64)  # of segments
+    step = max(1, int(counts.sum()) // max(most, 1))
+    while (-(-counts // step) + 1).sum() > most:
+        step += 1
+    return [line[np.append(np.arange(0, len(line) - 1, step), len(line) - 1)] for line in lines]
