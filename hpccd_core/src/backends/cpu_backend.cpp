@@ -322,7 +322,7 @@ std::optional<double> CpuBackend::separating_translation(Positions vertices, std
 
 std::optional<Penetration> CpuBackend::penetration(Positions vertices, std::array<std::uint32_t, 2> meshes,
                                                    const std::optional<Vec3<double>>& start) {
-  Penetration found = hpccd::penetration(moved_pair(vertices, meshes), start);
+  Penetration found = hpccd::penetration(moved_pair(vertices, meshes), start, shared_.pool);
   shared_.profiler.mark("translation");
   return found;
 }

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <numeric>
 #include <utility>
 
 #include "elementary/exact/boxes.h"
@@ -53,7 +55,10 @@ bool faces_meet(const V a[3], const V b[3]) {
   return false;
 }
 
-bool surfaces_meet(const MovedPair& pair, const Moved& in_a, const Moved& in_b) {
+// use(face of a, face of b) for the faces in leaves whose boxes overlap, by numbers in BoxedMesh, until it returns
+// true.
+template <class Use>
+bool any_near(const MovedPair& pair, const Moved& in_a, const Moved& in_b, Use&& use) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> stack;
   for (const std::uint32_t a : pair.a().roots)
     for (const std::uint32_t b : pair.b().roots) stack.emplace_back(a, b);
@@ -74,14 +79,23 @@ bool surfaces_meet(const MovedPair& pair, const Moved& in_a, const Moved& in_b) 
       stack.emplace_back(n, b.children), stack.emplace_back(n, b.children + 1);
     } else {
       for (std::uint32_t i = a.first_face; i < a.end_face; ++i)
-        for (std::uint32_t k = b.first_face; k < b.end_face; ++k) {
-          const auto &f = pair.a().faces[i], &g = pair.b().faces[k];
-          const V x[3] = {in_a(f[0]), in_a(f[1]), in_a(f[2])}, y[3] = {in_b(g[0]), in_b(g[1]), in_b(g[2])};
-          if (faces_meet(x, y)) return true;
-        }
+        for (std::uint32_t k = b.first_face; k < b.end_face; ++k)
+          if (use(i, k)) return true;
     }
   }
   return false;
+}
+
+void corners(const BoxedMesh& mesh, std::uint32_t face, const Moved& moved, V (&corner)[3]) {
+  for (std::size_t i = 0; i < 3; ++i) corner[i] = moved(mesh.faces[face][i]);
+}
+
+bool surfaces_meet(const MovedPair& pair, const Moved& in_a, const Moved& in_b) {
+  return any_near(pair, in_a, in_b, [&](std::uint32_t i, std::uint32_t k) {
+    V x[3], y[3];
+    corners(pair.a(), i, in_a, x), corners(pair.b(), k, in_b, y);
+    return faces_meet(x, y);
+  });
 }
 
 // The winding number of a point, as in solid/winding.h, in a moved mesh that does not contain it in its surface.
@@ -136,83 +150,102 @@ V nearest_point(const V& p, const V& a, const V& b, const V& c) {
   return best;
 }
 
-// The vertex of one mesh that is deepest inside another one, by branch and bound over the boxes of vertices: a point q
-// of the outer surface bounds the depth of all that is in a box by the distance of its farthest corner from q. Patches
-// around the deepest vertex are nearly perpendicular to the way to the surface, so this bound is much closer than the
-// distance of the middle plus the radius. All in the scale of BoxedMesh.
-class DeepestVertex {
+// The vertex of either mesh that is deepest inside the other one, if that is closed, by branch and bound over the boxes
+// of vertices: a point q of the outer surface bounds the depth of all that is in a box by the distance of its farthest
+// corner from q. Patches around the deepest vertex are nearly perpendicular to the way to the surface, so this bound is
+// much closer than the distance of the middle plus the radius. All in the scale of BoxedMesh.
+class DeepestVertexSearch {
  public:
-  DeepestVertex(const MovedPair& pair, const BoxedMesh& inner, const BoxedMesh& outer)
-      : pair_(pair), inner_(inner), outer_(outer) {}
+  explicit DeepestVertexSearch(const MovedPair& pair) : pair_(pair) {}
 
-  // If it is deeper than `best`; otherwise `best`.
-  double search(double best) {
-    best_ = best;
-    if (!outer_.topology->closed || outer_.roots.empty()) return best_;
-    for (const std::uint32_t n : inner_.roots) push(n, {INFINITY, n, {}, false});
+  DeepestVertex search() {
+    // A few vertices at first: the deeper the best one, the fewer boxes remain.
+    for (const bool of_a : {true, false}) {
+      const BoxedMesh& mesh = inner(of_a);
+      constexpr std::size_t n_samples = 64;
+      const std::size_t every = mesh.faces.size() / n_samples + 1;
+      for (std::size_t i = every / 2; contains(of_a) && i < mesh.faces.size(); i += every)
+        consider(mesh.faces[i][0], {INFINITY, 0, of_a, false, {}});
+    }
+    for (const bool of_a : {true, false})
+      if (contains(of_a))
+        for (const std::uint32_t n : inner(of_a).roots) push(n, {INFINITY, n, of_a, false, {}});
     std::uint32_t steps = 0;
     while (!heap_.empty() && heap_.front().most > best_) {
       if (++steps % 64 == 0) pair_.heed();
       const Entry top = heap_.front();
       std::pop_heap(heap_.begin(), heap_.end());
       heap_.pop_back();
-      const BoxedMesh::Node& node = inner_.nodes[top.node];
+      const BoxedMesh& mesh = inner(top.of_a);
+      const BoxedMesh::Node& node = mesh.nodes[top.node];
       if (node.children) push(node.children, top), push(node.children + 1, top);
       for (std::uint32_t i = node.first_face; i < node.end_face; ++i)
-        for (const std::uint32_t v : inner_.faces[i]) consider(v, top);
+        for (const std::uint32_t v : mesh.faces[i]) consider(v, top);
     }
-    return best_;
+    // Distances are within 1e-15 of the coordinates, whose largest is below 1, and relatively within 1e-14.
+    return {std::max(0.0, best_ * (1 - 1e-13) - 2e-14) / pair_.scale(), way_out_};
   }
 
  private:
   struct Entry {
-    double most;  // depth
+    double most;  // depth; infinite before anything is known
     std::uint32_t node;
+    bool of_a, all_inside;
     V near;  // a point of the outer surface
-    bool all_inside;
     bool operator<(const Entry& other) const { return most < other.most; }
   };
 
-  bool overlaps_outer(const BoxedMesh::Box& box) const {
-    return std::ranges::any_of(outer_.roots, [&](std::uint32_t n) { return overlap(box, outer_.nodes[n].box); });
+  const BoxedMesh& inner(bool a) const { return a ? pair_.a() : pair_.b(); }
+  const BoxedMesh& outer(bool of_a) const { return inner(!of_a); }
+  bool contains(bool of_a) const { return outer(of_a).topology->closed && !outer(of_a).roots.empty(); }
+  bool overlaps_outer(const BoxedMesh::Box& box, bool of_a) const {
+    const BoxedMesh& mesh = outer(of_a);
+    return std::ranges::any_of(mesh.roots, [&](std::uint32_t n) { return overlap(box, mesh.nodes[n].box); });
   }
-  bool inside(const V& given) const { return winding_in(outer_, {pair_, {0, 0, 0}}, given) != 0; }
+  bool inside(const V& given, bool of_a) const { return winding_in(outer(of_a), {pair_, {0, 0, 0}}, given) != 0; }
+  static NearPoint known(const V& p, const Entry& of) {
+    return of.most == INFINITY ? NearPoint{{}, INFINITY} : NearPoint{of.near, length(p - of.near)};
+  }
 
   void consider(std::uint32_t vertex, const Entry& of) {
     const V x = pair_.position(vertex);
-    if (!overlaps_outer({x, x}) || length(x - of.near) <= best_) return;
-    const double distance = nearest(x, {of.near, length(x - of.near)}, 0, best_).distance;
-    if (distance > best_ && (of.all_inside || inside(pair_.given(vertex)))) best_ = distance;
+    const NearPoint first = known(x, of);
+    if (first.distance <= best_ || !overlaps_outer({x, x}, of.of_a)) return;
+    const NearPoint q = nearest(outer(of.of_a), x, first, 0, best_);
+    if (!(q.distance > best_) || !(of.all_inside || inside(pair_.given(vertex), of.of_a))) return;
+    best_ = q.distance;
+    way_out_ = of.of_a ? q.at - x : x - q.at;
   }
 
   void push(std::uint32_t n, const Entry& parent) {
-    const BoxedMesh::Box& box = inner_.nodes[n].box;
-    if (!overlaps_outer(box)) return;
+    const BoxedMesh::Box& box = inner(parent.of_a).nodes[n].box;
+    if (!overlaps_outer(box, parent.of_a)) return;
     const auto most_from = [&](const V& q) {
       const auto most = [](double low, double high, double at) { return std::max(high - at, at - low); };
       return length(
           {most(box.low.x, box.high.x, q.x), most(box.low.y, box.high.y, q.y), most(box.low.z, box.high.z, q.z)});
     };
-    const bool first = parent.most == INFINITY;
-    Entry entry{first ? parent.most : std::min(parent.most, most_from(parent.near)), n, parent.near, parent.all_inside};
+    Entry entry = parent;
+    entry.node = n;
+    if (parent.most < INFINITY) entry.most = std::min(parent.most, most_from(parent.near));
     if (entry.most <= best_) return;
     const V half = 0.5 * (box.high - box.low), middle = box.low + half;
     const double radius = 1.0000001 * length(half) + 1e-15, slack = 0.25 * radius;
-    const NearPoint q = nearest(
-        middle, first ? NearPoint{{}, INFINITY} : NearPoint{parent.near, length(middle - parent.near)}, slack, 0);
+    // Nearer than best - radius, nothing in the box is deeper than the best.
+    const NearPoint q = nearest(outer(parent.of_a), middle, known(middle, parent), slack, best_ - radius);
     entry.near = q.at, entry.most = std::min(entry.most, most_from(q.at));
     if (entry.most <= best_) return;
     // No surface within the radius: all inside or all outside.
     if (!entry.all_inside && q.distance - slack > radius) {
-      if (!inside((1 / pair_.scale()) * middle)) return;
+      if (!inside((1 / pair_.scale()) * middle, parent.of_a)) return;
       entry.all_inside = true;
     }
     heap_.push_back(entry), std::push_heap(heap_.begin(), heap_.end());
   }
 
-  // A point of the outer surface that is at most `slack` farther than the nearest one, or nearer than `enough`. best: a
+  // A point of a surface that is at most `slack` farther than the nearest one, or nearer than `enough`. best: a
   // point to begin with, if any.
-  NearPoint nearest(const V& p, NearPoint best, double slack, double enough) {
+  NearPoint nearest(const BoxedMesh& mesh, const V& p, NearPoint best, double slack, double enough) {
     double limit = 0, square = best.distance * best.distance;
     const auto set_limit = [&] {
       const double d = best.distance - slack;
@@ -221,25 +254,32 @@ class DeepestVertex {
     set_limit();
     stack_.clear();
     const auto visit = [&](std::uint32_t n) {
-      if (const double d = square_of_distance(p, outer_.nodes[n].box); d < limit) stack_.emplace_back(d, n);
+      if (const double d = square_of_distance(p, mesh.nodes[n].box); d < limit) stack_.emplace_back(d, n);
     };
-    for (const std::uint32_t n : outer_.roots) visit(n);
+    for (const std::uint32_t n : mesh.roots) visit(n);
     while (!stack_.empty()) {
       const auto [gap, n] = stack_.back();
       stack_.pop_back();
       if (gap >= limit) continue;
-      const BoxedMesh::Node& node = outer_.nodes[n];
+      const BoxedMesh::Node& node = mesh.nodes[n];
       if (node.children) {
-        double x = square_of_distance(p, outer_.nodes[node.children].box);
-        double y = square_of_distance(p, outer_.nodes[node.children + 1].box);
+        double x = square_of_distance(p, mesh.nodes[node.children].box);
+        double y = square_of_distance(p, mesh.nodes[node.children + 1].box);
         const bool swap = x < y;
         if (std::max(x, y) < limit) stack_.emplace_back(std::max(x, y), node.children + swap);
         if (std::min(x, y) < limit) stack_.emplace_back(std::min(x, y), node.children + !swap);
         continue;
       }
+      // A face is not nearer than its corners are along any direction; that towards the leaf excludes most faces.
+      const V to = 0.5 * (node.box.low + node.box.high) - p;
+      const double away = length(to);
+      const V u = away > 0 ? (1 / away) * to : V{0, 0, 0};
       for (std::uint32_t i = node.first_face; i < node.end_face; ++i) {
-        const auto& f = outer_.faces[i];
-        const V q = nearest_point(p, pair_.position(f[0]), pair_.position(f[1]), pair_.position(f[2])), d = p - q;
+        const auto& f = mesh.faces[i];
+        const V x = pair_.position(f[0]), y = pair_.position(f[1]), z = pair_.position(f[2]);
+        const double along = std::min({dot(u, x - p), dot(u, y - p), dot(u, z - p)}) - 4e-15;
+        if (along > 0 && along * along >= limit) continue;
+        const V q = nearest_point(p, x, y, z), d = p - q;
         if (const double s = dot(d, d); s < square) square = s, best = {q, std::sqrt(s)}, set_limit();
       }
       if (best.distance <= enough) break;
@@ -250,8 +290,8 @@ class DeepestVertex {
   static double length(const V& x) { return std::sqrt(dot(x, x)); }
 
   const MovedPair& pair_;
-  const BoxedMesh &inner_, &outer_;
   double best_ = 0;
+  V way_out_{};
   std::vector<Entry> heap_;
   std::vector<std::pair<double, std::uint32_t>> stack_;
 };
@@ -269,11 +309,65 @@ bool is_free(const MovedPair& pair, const V& translation) {
   return !inside(pair.a(), in_a, pair.b(), in_b) && !inside(pair.b(), in_b, pair.a(), in_a);
 }
 
-double deepest_vertex(const MovedPair& pair) {
-  const double in_b = DeepestVertex(pair, pair.a(), pair.b()).search(0);
-  const double depth = DeepestVertex(pair, pair.b(), pair.a()).search(in_b);
-  // Distances are within 1e-15 of the coordinates, whose largest is below 1, and relatively within 1e-14.
-  return std::max(0.0, depth * (1 - 1e-13) - 2e-14) / pair.scale();
+std::vector<V> normals_of_contours(const MovedPair& pair, std::size_t most) {
+  const BoxedMesh &a = pair.a(), &b = pair.b();
+  // Curves are those of connected faces of a: their vertices are joined.
+  std::uint32_t first = UINT32_MAX, last = 0;
+  for (const auto& face : a.faces)
+    for (const std::uint32_t v : face) first = std::min(first, v), last = std::max(last, v);
+  std::vector<std::uint32_t> lower(last - first + 1);
+  std::iota(lower.begin(), lower.end(), 0u);
+  const auto find = [&](std::uint32_t vertex) {
+    std::uint32_t v = vertex - first;
+    while (lower[v] != v) v = lower[v] = lower[lower[v]];
+    return v;
+  };
+  struct Segment {
+    std::uint32_t vertex;
+    V from, to;
+  };
+  std::vector<Segment> segments;
+  const Moved at_rest{pair, {0, 0, 0}};
+  any_near(pair, at_rest, at_rest, [&](std::uint32_t i, std::uint32_t k) {
+    V x[3], y[3];
+    for (std::size_t c = 0; c < 3; ++c) x[c] = pair.position(a.faces[i][c]), y[c] = pair.position(b.faces[k][c]);
+    const V n = cross(x[1] - x[0], x[2] - x[0]), m = cross(y[1] - y[0], y[2] - y[0]), along = cross(n, m);
+    // On the line that both planes contain: the part in both triangles.
+    const auto part = [&](const V(&f)[3], const V& normal, const V& at, V(&ends)[2]) {
+      int count = 0;
+      for (int c = 0; c < 3; ++c) {
+        const V &p = f[c], &q = f[(c + 1) % 3];
+        const double s = dot(normal, p - at), t = dot(normal, q - at);
+        if ((s < 0) != (t < 0)) ends[std::min(count++, 1)] = p + (s / (s - t)) * (q - p);
+      }
+      if (count == 2 && dot(along, ends[0]) > dot(along, ends[1])) std::swap(ends[0], ends[1]);
+      return count == 2;
+    };
+    V p[2], q[2];
+    if (!part(x, m, y[0], p) || !part(y, n, x[0], q)) return false;
+    const V from = dot(along, p[0]) > dot(along, q[0]) ? p[0] : q[0];
+    const V to = dot(along, p[1]) < dot(along, q[1]) ? p[1] : q[1];
+    if (!(dot(along, from) < dot(along, to))) return false;
+    segments.push_back({a.faces[i][0], from, to});
+    for (const std::uint32_t v : a.faces[i]) {
+      const std::uint32_t x = find(v), y = find(a.faces[i][0]);
+      lower[std::max(x, y)] = std::min(x, y);
+    }
+    return false;
+  });
+  // Around the first point of each: the area of an open curve depends on it.
+  std::map<std::uint32_t, std::pair<V, V>> area;
+  for (const Segment& s : segments) {
+    auto& [origin, sum] = area.try_emplace(find(s.vertex), s.from, V{0, 0, 0}).first->second;
+    sum = sum + 0.5 * cross(s.from - origin, s.to - origin);
+  }
+  std::vector<V> normals;
+  for (const auto& [vertex, of] : area) normals.push_back(of.second);
+  std::ranges::stable_sort(normals, [](const V& x, const V& y) { return dot(x, x) > dot(y, y); });
+  if (normals.size() > most) normals.resize(most);
+  return normals;
 }
+
+DeepestVertex deepest_vertex(const MovedPair& pair) { return DeepestVertexSearch(pair).search(); }
 
 }  // namespace hpccd

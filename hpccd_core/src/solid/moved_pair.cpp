@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -357,6 +358,7 @@ Translation::Translation(const MovedPair& pair, const V& direction, const V& fro
   V u = cross(across, d);
   u = (1 / std::sqrt(dot(u, u))) * u;
   axis_[0] = u, axis_[1] = cross(d, u), axis_[2] = d;
+  per_axis_ = {1 / d.x, 1 / d.y, 1 / d.z};
 }
 
 int Translation::compare(const ContactTime& s, const ContactTime& t) const {
@@ -370,26 +372,39 @@ double Translation::length(const ContactTime& time) const { return Exact(*this).
 
 // The times, if any, at which a point of one box, moved, is a point of the other.
 bool Translation::meeting(const BoxedMesh::Box& a, const BoxedMesh::Box& b, Range& range) const {
-  const auto along = [&](double low, double high, double d) {  // low <= s d <= high
+  const auto along = [&](double low, double high, double d, double per) {  // low <= s d <= high
     low -= frame_error, high += frame_error;
     if (d == 0) return low <= 0 && high >= 0;
-    // A rounded coordinate of the direction is off by 4 u, times 4 at most.
-    const double s = low / d, t = high / d;
+    // A rounded coordinate of the direction is off by 4 u, and a product with its inverse by 2 u more, times 4 at most.
+    const double s = low * per, t = high * per;
     range.low = std::max(range.low, std::min(s, t)), range.high = std::min(range.high, std::max(s, t));
     return range.low <= range.high;
   };
   const V& d = axis_[2];
   const V low = b.low - a.high - from_, high = b.high - a.low - from_;
-  return along(low.x, high.x, d.x) && along(low.y, high.y, d.y) && along(low.z, high.z, d.z);
+  return along(low.x, high.x, d.x, per_axis_.x) && along(low.y, high.y, d.y, per_axis_.y) &&
+         along(low.z, high.z, d.z, per_axis_.z);
 }
 
-Translation::InFrame Translation::in_frame(const std::array<std::uint32_t, 3>& face, bool moves) const {
-  InFrame f;
+Translation::FaceInFrame Translation::in_frame(const std::array<std::uint32_t, 3>& face, bool moves) const {
+  FaceInFrame f;
   for (std::size_t i = 0; i < 3; ++i) {
     const V x = moves ? pair_.position(face[i]) + from_ : pair_.position(face[i]);
     f.u[i] = dot(axis_[0], x), f.v[i] = dot(axis_[1], x), f.w[i] = dot(axis_[2], x);
   }
+  const double* all[] = {f.u, f.v, f.w};
+  for (int k = 0; k < 3; ++k) {
+    f.low[k] = std::min(std::min(all[k][0], all[k][1]), all[k][2]);
+    f.high[k] = std::max(std::max(all[k][0], all[k][1]), all[k][2]);
+  }
   return f;
+}
+
+// Whether the boxes of faces or leaves are, across the direction.
+template <class A, class B>
+bool Translation::apart(const A& a, const B& b) {
+  return a.low[0] > b.high[0] + 2 * frame_error || b.low[0] > a.high[0] + 2 * frame_error ||
+         a.low[1] > b.high[1] + 2 * frame_error || b.low[1] > a.high[1] + 2 * frame_error;
 }
 
 // In the plane of u and v, where the faces are triangles that rest: times are differences of w over the points that
@@ -398,20 +413,17 @@ Translation::InFrame Translation::in_frame(const std::array<std::uint32_t, 3>& f
 // Bounds: an orientation from differences that are off by 2 `frame_error` each, and at most D, is off by E = 16
 // frame_error D + 64 frame_error^2, rounding included. A weight x / (x - y) of two orientations of opposite signs is
 // off by 8 E / |x - y|, and so is a height, times the range of heights.
-Translation::Found Translation::interval(const InFrame& a, const InFrame& b, const std::array<std::uint32_t, 3>& face_a,
+Translation::Found Translation::interval(const FaceInFrame& a, const FaceInFrame& b,
+                                         const std::array<std::uint32_t, 3>& face_a,
                                          const std::array<std::uint32_t, 3>& face_b, ContactInterval& found) const {
   const auto least = [](const double* x) { return std::min(std::min(x[0], x[1]), x[2]); };
   const auto most = [](const double* x) { return std::max(std::max(x[0], x[1]), x[2]); };
-  const double low_u[] = {least(a.u), least(b.u)}, high_u[] = {most(a.u), most(b.u)};
-  const double low_v[] = {least(a.v), least(b.v)}, high_v[] = {most(a.v), most(b.v)};
-  if (low_u[0] > high_u[1] + 2 * frame_error || low_u[1] > high_u[0] + 2 * frame_error ||
-      low_v[0] > high_v[1] + 2 * frame_error || low_v[1] > high_v[0] + 2 * frame_error)
-    return Found::no;
-  const double d = std::max(high_u[0], high_u[1]) - std::min(low_u[0], low_u[1]) + std::max(high_v[0], high_v[1]) -
-                   std::min(low_v[0], low_v[1]);
+  if (apart(a, b)) return Found::no;
+  const double d = std::max(a.high[0], b.high[0]) - std::min(a.low[0], b.low[0]) + std::max(a.high[1], b.high[1]) -
+                   std::min(a.low[1], b.low[1]);
   const double e = 16 * frame_error * d + 64 * frame_error * frame_error;
   double of_a[3][3], of_b[3][3];
-  const auto orient = [](const InFrame& x, int i, const InFrame& f, int k) {
+  const auto orient = [](const FaceInFrame& x, int i, const FaceInFrame& f, int k) {
     const int l = (k + 1) % 3;
     return (f.u[k] - x.u[i]) * (f.v[l] - x.v[i]) - (f.v[k] - x.v[i]) * (f.u[l] - x.u[i]);
   };
@@ -419,14 +431,14 @@ Translation::Found Translation::interval(const InFrame& a, const InFrame& b, con
     for (int k = 0; k < 3; ++k) of_a[i][k] = orient(a, i, b, k), of_b[k][i] = orient(b, k, a, i);
   const double area_a = of_b[0][0] + of_b[0][1] + of_b[0][2], area_b = of_a[0][0] + of_a[0][1] + of_a[0][2];
   // All of one beyond an edge of the other: corners of the latter have orientations 0, 0 and its area.
-  const auto apart = [&](const double of[3][3], double area) {
+  const auto beyond_edge = [&](const double of[3][3], double area) {
     for (int k = 0; k < 3; ++k) {
       const double x[3] = {of[0][k], of[1][k], of[2][k]};
       if (least(x) - e > std::max(0.0, area + 3 * e) || most(x) + e < std::min(0.0, area - 3 * e)) return true;
     }
     return false;
   };
-  if (apart(of_a, area_b) || apart(of_b, area_a)) return Found::no;
+  if (beyond_edge(of_a, area_b) || beyond_edge(of_b, area_a)) return Found::no;
 
   bool certain = true;
   std::array<std::pair<double, double>, 15> all;  // times and errors
@@ -440,7 +452,7 @@ Translation::Found Translation::interval(const InFrame& a, const InFrame& b, con
     if (n == 1 || at < found.begin.at) found.begin = time;
     if (n == 1 || at > found.end.at) found.end = time;
   };
-  const auto corner = [&](const double of[3], double area, const InFrame& f, double height, auto&& use) {
+  const auto corner = [&](const double of[3], double area, const FaceInFrame& f, double height, auto&& use) {
     const double s = area > 0 ? 1 : -1;
     if (s * of[0] < -e || s * of[1] < -e || s * of[2] < -e) return;
     if (s * area <= 24 * e) {
@@ -449,7 +461,7 @@ Translation::Found Translation::interval(const InFrame& a, const InFrame& b, con
     }
     certain &= s * of[0] > e && s * of[1] > e && s * of[2] > e;
     const double at = (of[0] * f.w[2] + of[1] * f.w[0] + of[2] * f.w[1]) / area;
-    use(at - height, 16 * e * (most(f.w) - least(f.w)) / (s * area));
+    use(at - height, 16 * e * (f.high[2] - f.low[2]) / (s * area));
   };
   for (int i = 0; i < 3; ++i) {
     corner(of_a[i], area_b, b, a.w[i], [&](double at, double error) { add(at, error, {i}, {0, 1, 2}); });
@@ -483,7 +495,7 @@ Translation::Found Translation::interval(const InFrame& a, const InFrame& b, con
   return certain ? Found::yes : Found::unsure;
 }
 
-bool Translation::times(const InFrame& a, const InFrame& b, const std::array<std::uint32_t, 3>& face_a,
+bool Translation::times(const FaceInFrame& a, const FaceInFrame& b, const std::array<std::uint32_t, 3>& face_a,
                         const std::array<std::uint32_t, 3>& face_b, ContactInterval& found) const {
   const Found is = interval(a, b, face_a, face_b, found);
   if (is != Found::unsure) return is == Found::yes;
@@ -491,9 +503,36 @@ bool Translation::times(const InFrame& a, const InFrame& b, const std::array<std
   return found.begin.n_a + found.begin.n_b > 0;
 }
 
+// Leaves of one mesh in the frame, each when it is first needed.
+class Translation::LeavesInFrame {
+ public:
+  LeavesInFrame(const Translation& translation, const BoxedMesh& mesh, bool moves)
+      : translation_(translation), mesh_(mesh), moves_(moves), number_(mesh.nodes.size()) {}
+  const LeafInFrame& operator[](std::uint32_t node) {
+    if (number_[node]) return leaves_[number_[node] - 1];
+    LeafInFrame& leaf = leaves_.emplace_back();
+    number_[node] = static_cast<std::uint32_t>(leaves_.size());
+    std::ranges::fill(leaf.low, INFINITY), std::ranges::fill(leaf.high, -INFINITY);
+    const BoxedMesh::Node& of = mesh_.nodes[node];
+    for (std::uint32_t i = of.first_face; i < of.end_face; ++i) {
+      const FaceInFrame& face = leaf.faces[i - of.first_face] = translation_.in_frame(mesh_.faces[i], moves_);
+      for (int k = 0; k < 3; ++k)
+        leaf.low[k] = std::min(leaf.low[k], face.low[k]), leaf.high[k] = std::max(leaf.high[k], face.high[k]);
+    }
+    return leaf;
+  }
+
+ private:
+  const Translation& translation_;
+  const BoxedMesh& mesh_;
+  bool moves_;
+  std::vector<std::uint32_t> number_;  // plus 1
+  std::deque<LeafInFrame> leaves_;
+};
+
 // Best first, by bounds from boxes.
 template <bool latest, class Accept>
-std::optional<ContactTime> Translation::search(double after, double before, Accept&& accept) const {
+std::optional<ContactTime> Translation::search(double after, double before, double enough, Accept&& accept) const {
   struct Entry {
     double key;
     std::uint32_t a, b;
@@ -504,13 +543,9 @@ std::optional<ContactTime> Translation::search(double after, double before, Acce
   std::optional<ContactTime> best;
   double bound = -INFINITY;  // of keys
   const auto push = [&](std::uint32_t a, std::uint32_t b) {
-    Range range{after, before};
-    if (!meeting(mesh_a.nodes[a].box, mesh_b.nodes[b].box, range)) return;
-    if constexpr (latest) {
-      range = {-INFINITY, INFINITY};
-      meeting(mesh_a.nodes[a].box, mesh_b.nodes[b].box, range);
-    }
-    const double key = latest ? range.high : -range.low;
+    Range range{-INFINITY, INFINITY};
+    if (!meeting(mesh_a.nodes[a].box, mesh_b.nodes[b].box, range) || range.high < after || range.low > before) return;
+    const double key = latest ? range.high : -std::max(range.low, after);
     if (key < bound) return;
     heap.push_back({key, a, b});
     std::push_heap(heap.begin(), heap.end());
@@ -521,7 +556,7 @@ std::optional<ContactTime> Translation::search(double after, double before, Acce
   };
   for (const std::uint32_t a : mesh_a.roots)
     for (const std::uint32_t b : mesh_b.roots) push(a, b);
-  InFrame of_a[16], of_b[16];
+  LeavesInFrame leaves_a(*this, mesh_a, true), leaves_b(*this, mesh_b, false);
   std::uint32_t steps = 0;
   while (!heap.empty() && heap.front().key >= bound) {
     if (++steps % 256 == 0) pair_.heed();
@@ -537,37 +572,42 @@ std::optional<ContactTime> Translation::search(double after, double before, Acce
       push(top.a, b.children), push(top.a, b.children + 1);
       continue;
     }
-    const std::uint32_t n_a = a.end_face - a.first_face, n_b = b.end_face - b.first_face;
-    for (std::uint32_t i = 0; i < n_a; ++i) of_a[i] = in_frame(mesh_a.faces[a.first_face + i], true);
-    for (std::uint32_t k = 0; k < n_b; ++k) of_b[k] = in_frame(mesh_b.faces[b.first_face + k], false);
-    for (std::uint32_t i = 0; i < n_a; ++i)
-      for (std::uint32_t k = 0; k < n_b; ++k) {
-        const InFrame &x = of_a[i], &y = of_b[k];
-        const double low = std::min({y.w[0], y.w[1], y.w[2]}) - std::max({x.w[0], x.w[1], x.w[2]}) - 4 * frame_error;
-        const double high = std::max({y.w[0], y.w[1], y.w[2]}) - std::min({x.w[0], x.w[1], x.w[2]}) + 4 * frame_error;
-        if (high < after || low > before || (latest ? high : -low) < bound) continue;
+    const LeafInFrame &of_a = leaves_a[top.a], &of_b = leaves_b[top.b];
+    const auto out_of_question = [&](const auto& x, const auto& y) {
+      const double low = y.low[2] - x.high[2] - 4 * frame_error, high = y.high[2] - x.low[2] + 4 * frame_error;
+      return high < after || low > before || (latest ? high : -low) < bound || apart(x, y);
+    };
+    if (out_of_question(of_a, of_b)) continue;
+    for (std::uint32_t i = 0; i < a.end_face - a.first_face; ++i) {
+      const FaceInFrame& x = of_a.faces[i];
+      if (out_of_question(x, of_b)) continue;
+      for (std::uint32_t k = 0; k < b.end_face - b.first_face; ++k) {
+        const FaceInFrame& y = of_b.faces[k];
+        if (out_of_question(x, y)) continue;
         ContactInterval found;
-        if (!times(of_a[i], of_b[k], mesh_a.faces[a.first_face + i], mesh_b.faces[b.first_face + k], found)) continue;
+        if (!times(x, y, mesh_a.faces[a.first_face + i], mesh_b.faces[b.first_face + k], found)) continue;
         const ContactTime& time = latest ? found.end : found.begin;
         if ((latest ? time.at : -time.at) + time.error < bound || !accept(found)) continue;
         if (best && (latest ? compare(*best, time) : compare(time, *best)) >= 0) continue;
         best = time;
         bound = (latest ? time.at : -time.at) - time.error;
+        if (bound > enough) return best;
       }
+    }
   }
   return best;
 }
 
-std::optional<ContactTime> Translation::latest_end(const ContactTime* containing) const {
-  if (!containing) return search<true>(-INFINITY, INFINITY, [](const ContactInterval&) { return true; });
+std::optional<ContactTime> Translation::latest_end(const ContactTime* containing, double enough) const {
+  if (!containing) return search<true>(-INFINITY, INFINITY, enough, [](const ContactInterval&) { return true; });
   const double low = containing->at - containing->error, high = containing->at + containing->error;
-  return search<true>(low, high, [&](const ContactInterval& i) {
+  return search<true>(low, high, enough, [&](const ContactInterval& i) {
     return compare(i.begin, *containing) <= 0 && compare(i.end, *containing) >= 0;
   });
 }
 
-std::optional<ContactTime> Translation::earliest_begin(const ContactTime& after) const {
-  return search<false>(after.at - after.error, INFINITY,
+std::optional<ContactTime> Translation::earliest_begin(const ContactTime& after, double before) const {
+  return search<false>(after.at - after.error, before, INFINITY,
                        [&](const ContactInterval& i) { return compare(i.begin, after) > 0; });
 }
 
@@ -580,13 +620,51 @@ bool Translation::contained_after(const ContactTime& time) const {
   return any_inside(pair_.a(), pair_.b(), true) || any_inside(pair_.b(), pair_.a(), false);
 }
 
+// By the crossings with the outer mesh, from the last one backwards.
+void Translation::inside_during(std::uint32_t vertex, bool of_a, std::vector<Range>& found) const {
+  const BoxedMesh& outer = of_a ? pair_.b() : pair_.a();
+  if (!outer.topology->closed) return;
+  const V x = pair_.position(vertex);
+  const BoxedMesh::Box point{x, x};
+  const FaceInFrame here = in_frame({vertex, vertex, vertex}, of_a);
+  std::vector<std::pair<double, int>> crossings;
+  std::vector<std::uint32_t> stack(outer.roots);
+  while (!stack.empty()) {
+    const BoxedMesh::Node& node = outer.nodes[stack.back()];
+    stack.pop_back();
+    Range range{0, INFINITY};
+    if (!(of_a ? meeting(point, node.box, range) : meeting(node.box, point, range))) continue;
+    if (node.children) stack.push_back(node.children + 1), stack.push_back(node.children);
+    for (std::uint32_t i = node.first_face; i < node.end_face; ++i) {
+      const FaceInFrame f = in_frame(outer.faces[i], !of_a);
+      if (apart(f, here)) continue;
+      double of[3];
+      for (int k = 0; k < 3; ++k) {
+        const int l = (k + 1) % 3;
+        of[k] = (f.u[k] - here.u[0]) * (f.v[l] - here.v[0]) - (f.v[k] - here.v[0]) * (f.u[l] - here.u[0]);
+        if (std::fabs(of[k]) <= 64 * frame_error * (f.high[0] - f.low[0] + f.high[1] - f.low[1])) return;  // uncertain
+      }
+      const int turn = sign_of(of[0]);
+      if (sign_of(of[1]) != turn || sign_of(of[2]) != turn) continue;
+      const double height = (of[0] * f.w[2] + of[1] * f.w[0] + of[2] * f.w[1]) / (of[0] + of[1] + of[2]) - here.w[0];
+      crossings.emplace_back(of_a ? height : -height, turn);
+    }
+  }
+  std::ranges::sort(crossings);
+  int winding = 0;
+  for (std::size_t i = crossings.size(); i-- > 0 && crossings[i].first > 0;) {
+    winding += crossings[i].second;
+    if (winding != 0) found.push_back({i ? std::max(0.0, crossings[i - 1].first) : 0.0, crossings[i].first});
+  }
+}
+
 // The faces that the vertex, on its way relative to the other mesh, meets later, with their orientation.
 int Translation::winding_after(std::uint32_t vertex, bool of_a, const ContactTime& time) const {
   const BoxedMesh& outer = of_a ? pair_.b() : pair_.a();
   const V x = pair_.position(vertex);
   const BoxedMesh::Box point{x, x};
   const std::array<std::uint32_t, 3> thrice{vertex, vertex, vertex};
-  const InFrame here = in_frame(thrice, of_a);
+  const FaceInFrame here = in_frame(thrice, of_a);
   int winding = 0;
   std::vector<std::uint32_t> stack(outer.roots);
   while (!stack.empty()) {
@@ -597,7 +675,7 @@ int Translation::winding_after(std::uint32_t vertex, bool of_a, const ContactTim
     if (node.children) stack.push_back(node.children + 1), stack.push_back(node.children);
     for (std::uint32_t i = node.first_face; i < node.end_face; ++i) {
       const auto& face = outer.faces[i];
-      const InFrame f = in_frame(face, !of_a);
+      const FaceInFrame f = in_frame(face, !of_a);
       const double size = [&] {
         double d = 0;
         for (int k = 0; k < 3; ++k) d = std::max({d, std::fabs(f.u[k] - here.u[0]), std::fabs(f.v[k] - here.v[0])});
@@ -632,9 +710,7 @@ int Translation::winding_after(std::uint32_t vertex, bool of_a, const ContactTim
       if (std::fabs(area) > 24 * e && certain) {
         const double height = (of[0] * f.w[2] + of[1] * f.w[0] + of[2] * f.w[1]) / area - here.w[0];
         at.at = of_a ? height : -height;
-        at.error = 4 * frame_error +
-                   16 * e * (std::max(std::max(f.w[0], f.w[1]), f.w[2]) - std::min(std::min(f.w[0], f.w[1]), f.w[2])) /
-                       std::fabs(area);
+        at.error = 4 * frame_error + 16 * e * (f.high[2] - f.low[2]) / std::fabs(area);
       } else {
         at.at = length(at) * pair_.scale(), at.error = 4e-15 * std::fabs(at.at);
       }

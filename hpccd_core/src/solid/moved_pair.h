@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -100,13 +101,20 @@ class Translation {
 
   // Two faces, or faces and edges, meet in one closed interval of times, as two convex sets whose difference meets a
   // line. These find, over all pairs of faces:
-  // the latest end of all intervals, or of those that contain a time, if there is one;
-  std::optional<ContactTime> latest_end(const ContactTime* containing = nullptr) const;
-  // the earliest begin after a time, if there is one.
-  std::optional<ContactTime> earliest_begin(const ContactTime& after) const;
+  // the latest end of all intervals, or of those that contain a time, if there is one; or any later than `enough`;
+  std::optional<ContactTime> latest_end(const ContactTime* containing = nullptr, double enough = INFINITY) const;
+  // the earliest begin after a time, if there is one, and none after `before` at least.
+  std::optional<ContactTime> earliest_begin(const ContactTime& after, double before = INFINITY) const;
 
   // Just after a time at which no interval continues: whether a component of one mesh is inside the closed other one.
   bool contained_after(const ContactTime& time) const;
+
+  struct Range {
+    double low, high;
+  };
+  // Adds the times from 0 on at which a vertex of one mesh is inside the closed other one: the meshes are not free of
+  // each other then. Within rounding errors; where those could matter, none.
+  void inside_during(std::uint32_t vertex, bool of_a, std::vector<Range>& found) const;
 
   // Sign of the difference of two times.
   int compare(const ContactTime& s, const ContactTime& t) const;
@@ -114,27 +122,33 @@ class Translation {
   double length(const ContactTime& time) const;
 
  private:
-  struct Range {
-    double low, high;
-  };
-  struct InFrame {
+  struct FaceInFrame {
     double u[3], v[3], w[3];
+    double low[3], high[3];  // of u, v and w
   };
+  struct LeafInFrame {
+    double low[3], high[3];
+    FaceInFrame faces[16];
+  };
+  class LeavesInFrame;
   class Exact;
 
   bool meeting(const BoxedMesh::Box& a, const BoxedMesh::Box& b, Range& range) const;
-  InFrame in_frame(const std::array<std::uint32_t, 3>& face, bool moves) const;
+  FaceInFrame in_frame(const std::array<std::uint32_t, 3>& face, bool moves) const;
   enum class Found : std::uint8_t { no, yes, unsure };
-  Found interval(const InFrame& a, const InFrame& b, const std::array<std::uint32_t, 3>& face_a,
+  template <class A, class B>
+  static bool apart(const A& a, const B& b);
+  Found interval(const FaceInFrame& a, const FaceInFrame& b, const std::array<std::uint32_t, 3>& face_a,
                  const std::array<std::uint32_t, 3>& face_b, ContactInterval& found) const;
-  bool times(const InFrame& a, const InFrame& b, const std::array<std::uint32_t, 3>& face_a,
+  bool times(const FaceInFrame& a, const FaceInFrame& b, const std::array<std::uint32_t, 3>& face_a,
              const std::array<std::uint32_t, 3>& face_b, ContactInterval& found) const;
   template <bool latest, class Accept>
-  std::optional<ContactTime> search(double after, double before, Accept&& accept) const;
+  std::optional<ContactTime> search(double after, double before, double enough, Accept&& accept) const;
   int winding_after(std::uint32_t vertex, bool of_a, const ContactTime& time) const;
 
   const MovedPair& pair_;
   Vec3<double> given_, from_, axis_[3];  // axis_[2]: the direction
+  Vec3<double> per_axis_;                // 1 / axis_[2]
   bool exact_;
 };
 

@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "solid/free_place.h"
 #include "solid/translation.h"
@@ -55,14 +58,14 @@ class HullOfPlaces {
     };
     double most = -INFINITY;
     V found{};
-    stack_.assign(mesh.roots.begin(), mesh.roots.end());
-    while (!stack_.empty()) {
-      const BoxedMesh::Node& node = mesh.nodes[stack_.back()];
-      stack_.pop_back();
+    std::vector<std::uint32_t> stack = mesh.roots;
+    while (!stack.empty()) {
+      const BoxedMesh::Node& node = mesh.nodes[stack.back()];
+      stack.pop_back();
       if (reach(node.box) <= most) continue;
       if (node.children) {
         const bool left = reach(mesh.nodes[node.children].box) >= reach(mesh.nodes[node.children + 1].box);
-        stack_.push_back(node.children + left), stack_.push_back(node.children + !left);
+        stack.push_back(node.children + left), stack.push_back(node.children + !left);
       }
       for (std::uint32_t i = node.first_face; i < node.end_face; ++i)
         for (const std::uint32_t v : mesh.faces[i])
@@ -72,7 +75,6 @@ class HullOfPlaces {
   }
 
   const MovedPair& pair_;
-  mutable std::vector<std::uint32_t> stack_;
 };
 
 // Directions on a sphere, in triangles that are bisected. In each corner the hull's support is known: a support x
@@ -177,23 +179,75 @@ std::optional<V> nearest_point(const std::vector<HalfSpace>& spaces) {
   return best;
 }
 
+// The shortest multiple of a place, a little longer if needed, that is free after rounding.
+std::optional<V> certified(const MovedPair& pair, const Place& place) {
+  if (!(place.depth > 0)) return std::nullopt;  // by rounding: the meshes are not free where they are
+  const double up = 1 / pair.scale();
+  // Times are within 2e-14, rounded positions within 1e-16.
+  for (double more = 4e-16; more < 1e-6; more *= 8) {
+    const V t = (up * (1 + more + more / std::max(place.depth, 1e-300))) * place.at;
+    if (is_free(pair, t)) return t;
+  }
+  return std::nullopt;
+}
+
 class Search {
  public:
   explicit Search(const MovedPair& pair) : pair_(pair) {}
 
-  // Beyond the last contact in a direction.
-  Place exit(const V& direction) const {
-    const auto end = Translation(pair_, direction, {0, 0, 0}, Decided::roughly).latest_end();
+  // Beyond the last contact in a direction, if that is nearer than a limit.
+  Place exit(const V& direction, double limit = INFINITY) const {
+    const auto end = Translation(pair_, direction, {0, 0, 0}, Decided::roughly).latest_end(nullptr, limit);
     if (!end) return {};
+    if (end->at > limit) return {{}, INFINITY, *end};
     const double depth = std::max(end->at, 1e-15);  // meshes that touch
     return {depth * direction, depth, *end};
   }
 
-  // In a gap between contacts, the first one in a direction: a translation within a ring or an open box.
+  // The first place along a direction that is free: before the last contact, one within a ring or an open box.
   Place first_gap(const V& direction) const {
     const ContactTime time = first_separation(Translation(pair_, direction));
     if (!(time.at > 0)) return {};
     return {time.at * direction, time.at, time};
+  }
+
+  // The same within rounding errors, if that is nearer than a limit, and found in few steps. contact: one that is late
+  // in this direction.
+  Place gap(const V& direction, double limit, const ContactTime& contact) const {
+    const Translation translation(pair_, direction, {0, 0, 0}, Decided::roughly);
+    // While a vertex is inside the other mesh there is none: those of the contact mostly are for long.
+    std::vector<Translation::Range> covered;
+    for (int i = 0; i < contact.n_a; ++i)
+      translation.inside_during(contact.a[static_cast<std::size_t>(i)], true, covered);
+    for (int i = 0; i < contact.n_b; ++i)
+      translation.inside_during(contact.b[static_cast<std::size_t>(i)], false, covered);
+    for (const bool of_a : {true, false}) {
+      const BoxedMesh& mesh = of_a ? pair_.a() : pair_.b();
+      constexpr std::size_t n_samples = 32;
+      const std::size_t every = mesh.faces.size() / n_samples + 1;
+      for (std::size_t i = every / 2; i < mesh.faces.size(); i += every)
+        translation.inside_during(mesh.faces[i][0], of_a, covered);
+    }
+    std::ranges::sort(covered, {}, &Translation::Range::low);
+    ContactTime time;
+    auto next = covered.begin();
+    int steps = 0;
+    const auto skip = [&] {
+      for (; next != covered.end() && next->low <= time.at; ++next)
+        if (next->high > time.at) time = {}, time.at = next->high;
+    };
+    while (skip(), time.at < limit && ++steps < 200) {
+      const auto end = translation.latest_end(&time, time.at + time.error);
+      if (end && translation.compare(*end, time) > 0) {
+        time = *end;
+        continue;
+      }
+      if (const Place place{time.at * direction, time.at, time}; certified(pair_, place)) return place;
+      const auto begin = translation.earliest_begin(time, limit);
+      if (!begin) break;
+      time = *begin;
+    }
+    return {};
   }
 
   // From the last contact along the normal of its features, as long as that is nearer: for convex meshes the foot of a
@@ -202,7 +256,7 @@ class Search {
     for (int step = 0; step < 32; ++step) {
       const std::optional<V> n = normal_of(pair_, place.contact);
       if (!n) break;
-      const Place next = exit(dot(*n, place.at) < 0 ? V{-n->x, -n->y, -n->z} : *n);
+      const Place next = exit(dot(*n, place.at) < 0 ? -1 * *n : *n, place.depth);
       if (!(next.depth < place.depth * (1 - 1e-13))) break;
       place = next;
     }
@@ -224,7 +278,7 @@ class Search {
       const V way = *target - p;
       const double far = length(way);
       const V direction = (1 / far) * way;
-      const auto hit = Translation(pair_, direction, p, Decided::roughly).earliest_begin({});
+      const auto hit = Translation(pair_, direction, p, Decided::roughly).earliest_begin({}, far);
       if (!hit || hit->at >= far) {
         p = *target;
         if (length(p) < best.depth) best.at = p, best.depth = length(p);
@@ -246,18 +300,6 @@ class Search {
  private:
   const MovedPair& pair_;
 };
-
-// The shortest multiple of a place, a little longer if needed, that is free after rounding.
-std::optional<V> certified(const MovedPair& pair, const Place& place) {
-  if (!(place.depth > 0)) return std::nullopt;  // by rounding: the meshes are not free where they are
-  const double up = 1 / pair.scale();
-  // Times are within 2e-14, rounded positions within 1e-16.
-  for (double more = 4e-16; more < 1e-6; more *= 8) {
-    const V t = (up * (1 + more + more / std::max(place.depth, 1e-300))) * place.at;
-    if (is_free(pair, t)) return t;
-  }
-  return std::nullopt;
-}
 
 Penetration result_of(const MovedPair& pair, const V& translation, const ContactTime& contact) {
   Penetration result;
@@ -285,58 +327,164 @@ Penetration result_of(const MovedPair& pair, const V& translation, const Contact
   return result;
 }
 
+// The places of several directions, in their order: those that are not much longer than the best one, or than a limit.
+// The limit falls from batch to batch, which are as long for any number of threads.
+std::vector<Place> exits(const Search& search, std::span<const V> directions, double limit, ThreadPool& pool) {
+  constexpr std::size_t batch = 16;
+  // How much longer a place may be and lead to a shorter one.
+  const auto reach = [&] { return 1.2 * limit + 1e-12; };
+  std::vector<Place> all(directions.size());
+  for (std::size_t first = 0; first < directions.size(); first += batch) {
+    const std::size_t n = std::min(batch, directions.size() - first);
+    parallel_for_each(pool, n, [&](std::size_t i) { all[first + i] = search.exit(directions[first + i], reach()); });
+    for (std::size_t i = first; i < first + n; ++i) limit = std::min(limit, all[i].depth);
+  }
+  std::erase_if(all, [&](const Place& place) { return !(place.depth <= reach()); });
+  return all;
+}
+
+bool shorter(const Place& x, const Place& y) { return x.depth < y.depth; }
+
+// Axes of inertia of the vertices of the faces.
+std::array<V, 3> principal_axes(const MovedPair& pair, const BoxedMesh& mesh) {
+  V sum{0, 0, 0};
+  for (const auto& face : mesh.faces) sum = sum + pair.position(face[0]);
+  const V middle = (1 / static_cast<double>(mesh.faces.size())) * sum;
+  double m[3][3] = {};
+  for (const auto& face : mesh.faces) {
+    const V d = pair.position(face[0]) - middle;
+    const double x[3] = {d.x, d.y, d.z};
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) m[i][k] += x[i] * x[k];
+  }
+  // Jacobi rotations.
+  V axes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int sweep = 0; sweep < 8; ++sweep)
+    for (int i = 0; i < 2; ++i)
+      for (int k = i + 1; k < 3; ++k) {
+        if (m[i][k] == 0) continue;
+        const double h = 0.5 * (m[k][k] - m[i][i]) / m[i][k];
+        const double t = (h < 0 ? -1 : 1) / (std::fabs(h) + std::sqrt(h * h + 1)), c = 1 / std::sqrt(t * t + 1),
+                     s = t * c;
+        const auto rotate = [&](auto& x, auto& y) {
+          const auto old = x;
+          x = c * old - s * y, y = s * old + c * y;
+        };
+        for (auto& row : m) rotate(row[i], row[k]);
+        for (int r = 0; r < 3; ++r) rotate(m[i][r], m[k][r]);
+        rotate(axes[i], axes[k]);
+      }
+  return {axes[0], axes[1], axes[2]};
+}
+
+// The best places of those, the shortest first, in different directions.
+std::vector<Place> starts_of(std::vector<Place> places, std::size_t most) {
+  std::ranges::stable_sort(places, shorter);
+  std::vector<Place> starts;
+  for (const Place& place : places) {
+    const bool is_new = std::ranges::none_of(
+        starts, [&](const Place& other) { return dot(place.at, other.at) > 0.97 * place.depth * other.depth; });
+    if (is_new && starts.size() < most) starts.push_back(place);
+  }
+  return starts;
+}
+
+// Directions all around, and a few that are good for the hulls, to a thousandth; finer where that costs little.
+std::vector<V> directions_of_hulls(const HullOfPlaces& hull, bool small, double& nearest) {
+  Directions directions(hull);
+  directions.refine(0, 66);
+  const std::size_t n_spread = directions.corners().size();
+  directions.refine(small ? 1e-6 : 1e-3, small ? 6000 : 200);
+  nearest = directions.best();
+  std::vector<Directions::Corner> order = directions.corners();
+  const auto nearer = [](const auto& x, const auto& y) { return x.distance < y.distance; };
+  std::stable_sort(order.begin() + static_cast<std::ptrdiff_t>(n_spread), order.end(), nearer);
+  order.resize(std::min(n_spread + 16, order.size()));
+  std::ranges::stable_sort(order, nearer);
+  std::vector<V> result;
+  for (const auto& corner : order) result.push_back(corner.direction);
+  return result;
+}
+
 }  // namespace
 
-Penetration penetration(const MovedPair& pair, const std::optional<V>& start) {
+Penetration penetration(const MovedPair& pair, const std::optional<V>& start, ThreadPool& pool) {
   if (is_free(pair, {0, 0, 0})) return {};
   const Search search(pair);
-  std::vector<Place> places;
-  const auto add = [&](const V& direction) {
-    if (const Place place = search.exit(direction); place.depth < INFINITY) places.push_back(place);
-  };
   const bool small = pair.a().faces.size() + pair.b().faces.size() < 2000;
-  const auto add_gap = [&](const V& direction) {  // decided exactly, which takes long for large meshes
-    if (const Place place = small ? search.first_gap(direction) : Place{}; place.depth < INFINITY)
-      places.push_back(place);
+  if (small) pair.bits();  // before threads share it
+  DeepestVertex deepest;
+  std::vector<Place> places;
+  // Exactly where that does not take long.
+  const auto gap = [&](const V& direction, double limit, const ContactTime& late) {
+    return small ? search.first_gap(direction) : search.gap(direction, limit, late);
   };
-  const HullOfPlaces hull(pair);
+  const auto local_search = [&](const Place& from, bool slides) {
+    const Place foot = search.descend(from);
+    return slides ? search.slide(foot) : foot;
+  };
   const double largest = start ? max_norm(*start) : 0;
   if (start && largest > 0) {
     const int top = std::ilogb(largest);
     const V direction = unit({std::ldexp(start->x, -top), std::ldexp(start->y, -top), std::ldexp(start->z, -top)});
-    add(direction), add_gap(direction);
+    Place near, in_gap;
+    parallel_for_each(pool, 2, [&](std::size_t task) {
+      if (task == 0) {
+        deepest = deepest_vertex(pair);
+        return;
+      }
+      const Place from = search.exit(direction);
+      if (!(from.depth < INFINITY)) return;
+      near = local_search(from, true);
+      in_gap = gap(direction, near.depth, from.contact);
+      if (in_gap.depth < near.depth) in_gap = local_search(in_gap, true);
+    });
+    for (const Place& place : {near, in_gap})
+      if (place.depth < INFINITY) places.push_back(place);
   }
   if (places.empty()) {
-    // Of the hulls, to a thousandth; finer where that costs little.
-    Directions directions(hull);
-    directions.refine(0, 66);
-    const std::size_t n_spread = directions.corners().size();
-    directions.refine(small ? 1e-6 : 1e-3, small ? 6000 : 600);
-    std::vector<Directions::Corner> order = directions.corners();
-    const auto nearer = [](const auto& x, const auto& y) { return x.distance < y.distance; };
-    std::stable_sort(order.begin() + static_cast<std::ptrdiff_t>(n_spread), order.end(), nearer);
-    for (std::size_t i = 0; i < std::min(n_spread + 16, order.size()); ++i) add(order[i].direction);
-    for (std::size_t i = 0; i < 6; ++i) add_gap(order[i].direction);  // along the axes
-  }
-  const auto shorter = [](const Place& x, const Place& y) { return x.depth < y.depth; };
-  std::stable_sort(places.begin(), places.end(), shorter);
-  const std::size_t n_starts = std::min<std::size_t>(places.size(), 6);
-  for (std::size_t i = 0; i < n_starts; ++i) {
-    const Place foot = search.descend(places[i]);
-    places.push_back(foot);
-    if (i < 3) places.push_back(search.slide(foot));
+    std::vector<V> directions, normals;
+    double limit = INFINITY;
+    parallel_for_each(pool, 3, [&](std::size_t task) {
+      if (task == 0) deepest = deepest_vertex(pair);
+      if (task == 1) directions = directions_of_hulls(HullOfPlaces(pair), small, limit);
+      if (task == 2) normals = normals_of_contours(pair, 4);
+    });
+    for (const BoxedMesh* mesh : {&pair.a(), &pair.b()})
+      for (const V& axis : principal_axes(pair, *mesh)) normals.push_back(axis);
+    for (const V& n : normals)
+      if (const double most = max_norm(n); most > 1e-150)
+        for (const double sign : {1.0, -1.0}) directions.push_back(unit((sign / most) * n));
+    if (const double most = max_norm(deepest.way_out); most > 0)
+      directions.push_back(unit((1 / most) * deepest.way_out));
+    places = exits(search, directions, limit, pool);
+    const std::vector<Place> from = starts_of(places, 6);
+    for (const Place& place : places) limit = std::min(limit, place.depth);
+    std::vector<Place> found(from.size() + 6);
+    parallel_for_each(pool, found.size(), [&](std::size_t i) {
+      if (i < from.size()) {
+        found[i] = local_search(from[i], i < 3);
+        return;
+      }
+      const std::size_t axis = i - from.size();
+      const double sign = axis % 2 ? -1 : 1;
+      const V direction = axis < 2 ? V{sign, 0, 0} : axis < 4 ? V{0, sign, 0} : V{0, 0, sign};
+      found[i] = gap(direction, limit, search.exit(direction, limit).contact);
+      if (found[i].depth < limit) found[i] = local_search(found[i], true);
+    });
+    std::ranges::copy_if(found, std::back_inserter(places), [](const Place& place) { return place.depth < INFINITY; });
   }
   // The hulls' tangent planes are free in any case.
-  std::stable_sort(places.begin(), places.end(), shorter);
+  std::ranges::stable_sort(places, shorter);
+  const auto with_bound = [&](Penetration result) {
+    result.lower_bound = std::min(deepest.depth, result.depth);
+    return result;
+  };
   for (const Place& place : places)
-    if (const auto t = certified(pair, place)) {
-      Penetration result = result_of(pair, *t, place.contact);
-      result.lower_bound = std::min(deepest_vertex(pair), result.depth);
-      return result;
-    }
+    if (const auto t = certified(pair, place)) return with_bound(result_of(pair, *t, place.contact));
   // Rounded coordinates hardly distinguish the meshes: far enough along an axis.
   for (double far = 1; far < 4; far *= 2)
-    if (const V t{far / pair.scale(), 0, 0}; is_free(pair, t)) return result_of(pair, t, {});
+    if (const V t{far / pair.scale(), 0, 0}; is_free(pair, t)) return with_bound(result_of(pair, t, {}));
   throw InvalidArgument("vertices: coordinates are too large for a translation that separates the meshes");
 }
 

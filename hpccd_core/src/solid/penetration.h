@@ -4,12 +4,13 @@
 
 #include <optional>
 
+#include "base/parallel.h"
 #include "hpccd/results.h"
 #include "solid/moved_pair.h"
 
 namespace hpccd {
 
-// start: a translation to begin with, in place of a search in all directions.
-Penetration penetration(const MovedPair& pair, const std::optional<Vec3<double>>& start);
+// start: a translation to begin with, in place of a search in all directions. The same for any number of threads.
+Penetration penetration(const MovedPair& pair, const std::optional<Vec3<double>>& start, ThreadPool& pool);
 
 }  // namespace hpccd
