@@ -61,6 +61,16 @@ def quiet(n):
     return scene, start, start + [0, 0, 0.1]
 
 
+def shells(n):
+    """Closed meshes, one mostly within the other."""
+    vertices, faces = hc.shapes.icosphere(n)
+    scene = hc.Scene()
+    for name in "ab":
+        scene.add_mesh(name, faces, self_collision=False)
+    start = np.concatenate([vertices, 0.9 * vertices + [0.2, 0.1, 0.05]])
+    return scene, start, start
+
+
 FAST = {"accuracy": "balanced"}
 CASES = {
     "batches": (lambda: soup(30_000, 0.01), FAST),
@@ -87,6 +97,11 @@ SNAPSHOTS = {
     "intersections": (lambda: soup(10_000, 0.03), lambda detector, points: detector.intersections(points)),
     "intersections, last resorts": (lambda: layers(60, 0), lambda detector, points: detector.intersections(0 * points)),
     "distances": (lambda: layers(100, 0), lambda detector, points: detector.distances(points)),
+    "penetration": (lambda: shells(60), lambda detector, points: detector.penetration(points, "a", "b")),
+    "separating translation": (
+        lambda: shells(60),
+        lambda detector, points: detector.separating_translation(points, "a", "b", (1, 2, 3)),
+    ),
 }
 
 
@@ -191,6 +206,8 @@ def test_a_cancelled_detector_results_no_query():
         lambda: detector.proximity(points, 0.1),
         lambda: detector.intersections(points),
         lambda: detector.distances(points),
+        lambda: detector.separating_translation(points, 0, 1, (0, 0, 1)),
+        lambda: detector.penetration(points, 0, 1),
     ):
         with pytest.raises(hc.Cancelled, match="^the detector was cancelled; create another one$"):
             ask()

@@ -152,6 +152,18 @@ def test_contained_meshes_and_open_ones():
     assert p.lower_bound < p.depth <= 0.5 + 1e-9 and is_free(through, lid, p.translation)
 
 
+@pytest.mark.parametrize("at", [(0, 0, 0), (1, 2, 3), (9e299, 0, -9e299), (5e-324, 0, 0)])
+def test_faces_without_extent(at):
+    """No direction has an interval in which they meet: a short shift is tried, then longer ones."""
+    point = np.tile(np.array(at, dtype=float), (3, 1)), np.array([[0, 1, 2]])
+    p = penetration(point, point)
+    assert is_free(point, point, p.translation) and (p.kind, p.features, p.lower_bound) == ("", (), 0)
+    assert 0 < p.depth <= max(4e-15 * (np.abs(at).max() or 1), 1e-300)
+    segment = point[0] + np.array([(0, 0, 0), (1, 1, 0), (2, 2, 0)]), point[1]
+    if max(at) < 1e100:
+        assert is_free(segment, point, penetration(segment, point).translation)
+
+
 def test_features_carry_the_depth():
     box = hc.shapes.box()
     p = penetration((np.array([[0.1, 0.05, 0.4], [1, 0, 2], [-1, 1, 2], [-1, -1, 2]]), TETRAHEDRON), box)
@@ -175,6 +187,33 @@ def test_deterministic():
     vertices = np.concatenate([a[0], b[0]])
     results = [detector_of(a, b, threads=threads).penetration(vertices, "a", "b") for threads in (1, 2, 1)]
     assert len({(r.translation.tobytes(), r.lower_bound, r.features) for r in results}) == 1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_large_meshes_are_not_moved_farther_than_along_an_axis(seed):
+    """Also where that ends in a gap, and with any number of threads; a start takes as short a way."""
+    rng = np.random.default_rng(seed)
+    ring, stick = torus(60, 30), (hc.shapes.icosphere(12)[0] * [0.3, 0.3, 3], hc.shapes.icosphere(12)[1])
+    pairs = [
+        (bumpy(14, rng), torus(50, 30)),
+        ((stick[0] + rng.uniform(-0.6, 0.6, 3), stick[1]), ring),
+        ((0.4 * bumpy(12, rng)[0] + [0.2, 0.1, 0.3], bumpy(12, rng)[1]), ring),
+        ((stick[0] + rng.uniform(-0.6, 0.6, 3), stick[1][1:]), (ring[0], ring[1][1:])),
+    ]
+    for a, b in pairs:
+        assert len(a[1]) + len(b[1]) > 2000
+        vertices = np.concatenate([a[0], b[0]])
+        detectors = [detector_of(a, b, threads=threads) for threads in (1, 2, 3)]
+        results = [detector.penetration(vertices, "a", "b") for detector in detectors]
+        assert len({(r.translation.tobytes(), r.depth, r.lower_bound, r.features) for r in results}) == 1
+        p = results[0]
+        assert is_free(a, b, p.translation)
+        axes = np.concatenate([np.eye(3), -np.eye(3)])
+        assert p.depth <= min(detectors[0].separating_translation(vertices, "a", "b", d) for d in axes) * (1 + 1e-9)
+        starts = [detector.penetration(vertices, "a", "b", start=p.translation) for detector in detectors]
+        assert len({(r.translation.tobytes(), r.depth, r.lower_bound, r.features) for r in starts}) == 1
+        assert starts[0].depth <= p.depth * (1 + 1e-9) and is_free(a, b, starts[0].translation)
+        assert starts[0].lower_bound == p.lower_bound
 
 
 @pytest.mark.parametrize("start", [(0, np.nan, 1), (1, 0), "z"])

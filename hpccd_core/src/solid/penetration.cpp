@@ -482,10 +482,13 @@ Penetration penetration(const MovedPair& pair, const std::optional<V>& start, Th
   };
   for (const Place& place : places)
     if (const auto t = certified(pair, place)) return with_bound(result_of(pair, *t, place.contact));
-  // Rounded coordinates hardly distinguish the meshes: far enough along an axis.
-  for (double far = 1; far < 4; far *= 2)
-    if (const V t{far / pair.scale(), 0, 0}; is_free(pair, t)) return with_bound(result_of(pair, t, {}));
-  throw InvalidArgument("vertices: coordinates are too large for a translation that separates the meshes");
+  // Faces without extent meet in no interval of positive length. Twice the unit of the scale is far enough: scaled
+  // coordinates are below 1, so then even the boxes are apart.
+  V t;
+  double far = 0x1p-51;
+  do t = {far / pair.scale(), 0, 0}, far *= 4;
+  while (!is_free(pair, t));
+  return with_bound(result_of(pair, t, {}));
 }
 
 }  // namespace hpccd
