@@ -251,15 +251,14 @@ class SpeedScaleListener(StopListener):
     """Listens to the node's topic speed_scale; ``speed_scale`` is 0 whenever the robot must stop.
 
     It is above 0 only if a message sent less than ``stop_timeout`` seconds ago says so and its one publisher is alive:
-    silence and whatever makes ``stop`` of a StopListener true make it 0. ``stop`` is true where it is 0, and ``reason``
-    says why.
+    it is 0 whenever ``stop`` of a StopListener would be true. ``stop`` is true where it is 0, and ``reason`` says why.
 
     Parameters
     ----------
     node, topic, stop_timeout, clock_error
-        As of StopListener.
+        See StopListener.
     on_change : callable, optional
-        Called with this listener after ``speed_scale`` changed; when, is as of StopListener.
+        Called with this listener after ``speed_scale`` changed, at the same times as that of StopListener.
 
     Raises
     ------

@@ -141,7 +141,12 @@ def _summary(statuses: dict[str, Status], parameters: dict[str, Any]) -> dict[st
 def _stop(values: dict[str, str], text: str) -> dict[str, Any]:
     """speed_scale: None: the node publishes none."""
     scale = values.get("speed_scale")
-    return {"true": values["stop"] == "True", "text": text, "speed_scale": None if scale is None else float(scale)}
+    return {
+        "true": values["stop"] == "True",
+        "text": text,
+        "speed_scale": None if scale is None else float(scale),
+        "not_closed": values["not_closed"],
+    }
 
 
 def _of_mesh(frames: dict[str, str], mesh: str) -> dict[str, Any]:
@@ -214,6 +219,8 @@ def _lines(found: dict[str, Any]) -> list[str]:
         lines.append(f"  last rejection: {found['last_rejection']}")
     if found["stop"] is not None:
         lines.append(f"  stop: {found['stop']['text']}")
+        if found["stop"]["not_closed"]:
+            lines.append(f"  not closed, so whether a mesh is inside is unknown: {found['stop']['not_closed']}")
     return lines + ([f"  wrong: {text}" for text in found["wrong"]] or ["  nothing is wrong"])
 
 

@@ -91,7 +91,7 @@ class StopState:
         self._unpublished: Why | None = None
         self._published: Why | None = None
         self._looked: float | None = None  # when the publishing thread last ran, in steady time
-        self._oldest, self._oldest_of = 0, ""  # oldest message of the last clear step: when it was sent, and its mesh
+        self._oldest, self._oldest_of = 0, ""  # oldest message of the last result: when it was sent, and its mesh
         self.rises: Counter[Cause] = Counter()
 
     def begin(self, scene: WatchedScene) -> None:
@@ -151,6 +151,8 @@ class StopState:
                 self._ages.hear(f"a message of mesh {mesh}", 1e-9 * (sent - now), self._clocks.steady())
             if not self._ages.why(self._clocks.steady()):  # otherwise it is unknown which of two messages is newer
                 self._doubts = {key: item for key, item in self._doubts.items() if not item.settled(by_name)}
+            if near or inside:
+                self._oldest, self._oldest_of = min(moving, default=(ALWAYS, ""))
         if near:
             pair = " and ".join(near)
             self._set_cause(Cause.NEAR, f"{pair} came within {distance:g} of each other in the last step")
@@ -270,6 +272,8 @@ class StopState:
 
     def _now(self) -> Why | None:
         if self._why is not None:
+            if self._why.cause in (Cause.NEAR, Cause.INSIDE) and (old := self._too_old()):
+                return replace(old, text=f"{old.text}; in it, {self._why.text}")
             return self._why
         for (cause, _), doubt in self._doubts.items():
             if doubt.meshes:
@@ -281,6 +285,10 @@ class StopState:
             return Why(Cause.REJECTED, f"robot {name}: {text}")
         if text := self._ages.why(self._clocks.steady()):
             return Why(Cause.CLOCKS, text)
+        return self._too_old()
+
+    def _too_old(self) -> Why | None:
+        """Whether the messages of the last step with a result say nothing about the present."""
         age = self._clocks.system() - self._oldest
         if self._oldest == ALWAYS or -self._clock_error_ns <= age < self._timeout_ns:
             return None

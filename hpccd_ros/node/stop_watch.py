@@ -114,7 +114,7 @@ class StopWatch:
         distance, timeout = settings["stop_distance"], settings["stop_timeout"]
         if timeout > LONG:
             node.get_logger().warning(
-                f"stop_timeout: {timeout:g} s, so that a publisher that ends is noticed only then; it is in seconds"
+                f"stop_timeout: {timeout:g} s, so a publisher that ends is noticed only after that time; the unit is s"
             )
         self._approach_time: float = settings["approach_time"]
         self._state = StopState(
@@ -181,8 +181,9 @@ class StopWatch:
         before, self._scene_of, self._not_closed = self._not_closed, frame, self._nearness.not_closed(frame)
         if set(self._not_closed) - set(before):
             self._node.get_logger().warning(
-                f"stop: {listed(self._not_closed)}: not closed, so that what lies inside is unknown, and only the "
-                "distance of the surfaces counts; close the mesh where something may get inside without a contact"
+                f"stop: {listed(self._not_closed)}: not closed, so stop cannot tell whether a mesh is inside and uses "
+                "the distance of the surfaces only; fill the holes, or orient all faces alike, if something may get "
+                "inside without a contact"
             )
 
     def rejected(self, rejection: Rejection) -> None:

@@ -211,4 +211,4 @@ def test_a_node_with_an_open_mesh(start_stream):
     values = stream.status("")
     assert values["not_closed"] == "table"
     (warning,) = [line for line in stream.node.output().splitlines() if "not closed" in line]
-    assert "[WARN]" in warning and "stop: table: not closed, so that what lies inside is unknown" in warning
+    assert "[WARN]" in warning and "stop: table: not closed, so stop cannot tell whether a mesh is inside" in warning

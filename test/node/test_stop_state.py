@@ -73,6 +73,21 @@ def test_false_only_after_an_answer(state):
     assert cause(state) is Cause.UNANSWERED
 
 
+@pytest.mark.parametrize("found", [{"near": PAIR}, {"inside": PAIR}], ids=["near", "inside"])
+def test_the_cause_is_silence_once_the_last_result_is_old(state, found):
+    known = next(iter(found))
+    now = [Origin(state.times.now)] * 3
+    state.answered(found.get("near"), 0.25, now, inside=found.get("inside"))
+    assert cause(state) == known
+    state.times.pass_by(TIMEOUT - 1)
+    assert cause(state) == known
+    state.times.pass_by(2)
+    assert cause(state) == "silent"
+    assert "11 s ago" in state.why().text and "hand" in state.why().text and "table" in state.why().text
+    state.answered(found.get("near"), 0.25, [Origin(state.times.now)] * 3, inside=found.get("inside"))
+    assert cause(state) == known
+
+
 def test_an_answer_for_a_smaller_distance_does_not_count(state):
     clear(state)
     state.changed(0.5)
