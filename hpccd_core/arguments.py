@@ -107,6 +107,8 @@ def mesh_number(name: str, mesh: str | int, numbers: Mapping[str, int]) -> int:
             there = ", ".join(numbers) or "none"
             raise ValueError(f"{name}: no mesh is named {mesh!r}; the scene has {there}{did_you_mean(mesh, numbers)}")
         return numbers[mesh]
+    if not hasattr(mesh, "__index__") or isinstance(mesh, np.ndarray):
+        raise TypeError(f"{name}: expected the name or number of a mesh, got {type(mesh).__name__}")
     if not numbers:
         raise ValueError(f"{name}: the scene has no mesh yet; call add_mesh first")
     return whole_number(name, mesh, 0, len(numbers) - 1)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from typing import Any, NamedTuple, NoReturn, TypeVar
 
@@ -86,7 +87,8 @@ class WithSides:
 
     def __getitem__(self, row: NoReturn) -> NoReturn:
         """Raise TypeError: rows are in the arrays."""
-        arrays = ", ".join(name for name, value in vars(self).items() if isinstance(value, np.ndarray))
+        counted = [field.name for field in dataclasses.fields(self) if field.compare]  # type: ignore[arg-type]
+        arrays = ", ".join(name for name in counted if isinstance(getattr(self, name), np.ndarray))
         raise _NotASequence(f"{type(self).__name__}: not a sequence; its rows are in the arrays {arrays}")
 
     @functools.cached_property

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from . import _core, arguments
 from .array_types import ArrayLike
 from .mesh_layout import Indices
+from .worlds import ComparedByRows
 
 
 def closed(faces: ArrayLike) -> bool:
-    """Whether a mesh is closed: each edge is in exactly two faces, which name its vertices in opposite orders.
+    """Whether a mesh is closed: each edge is in exactly two faces, which are oriented consistently.
 
     Parameters
     ----------
@@ -34,8 +35,8 @@ def closed(faces: ArrayLike) -> bool:
 
     Notes
     -----
-    It depends on the faces alone. Two vertices at the same position are two vertices: files that list the corners of
-    each triangle have no closed meshes.
+    Consistently: the two faces list the vertices of the edge in opposite orders. Positions do not matter: two vertices
+    at the same position are two vertices, so a file that lists the corners of each triangle has no closed mesh.
 
     Examples
     --------
@@ -48,7 +49,7 @@ def closed(faces: ArrayLike) -> bool:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class SignedDistances:
+class SignedDistances(ComparedByRows):
     """Signed distances of K points to a closed mesh, made by :meth:`Detector.signed_distances`.
 
     With worlds, arrays have W as their first axis.
@@ -75,7 +76,7 @@ class SignedDistances:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Penetration:
+class Penetration(ComparedByRows):
     """A translation that separates two meshes, made by :meth:`Detector.penetration`.
 
     Attributes
@@ -88,7 +89,8 @@ class Penetration:
         No shorter translation separates the meshes: the distance of the deepest vertex of either mesh inside the
         closed other one from its surface. 0 without such a vertex.
     kind : {"vertex-face", "edge-edge", ""}
-        The features that touch after the translation; empty if the meshes are free, or where fewer vertices touch.
+        The features that touch after the translation; empty if the meshes are free, or if no pair of features
+        determines the result.
     features : tuple of int
         Scene-wide: vertex and face, or the vertices of an edge of a and of an edge of b.
     """

@@ -533,7 +533,7 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
       [](const Array<std::uint32_t>& faces) {
         using Face = std::array<std::uint32_t, 3>;
         const std::span rows(reinterpret_cast<const Face*>(faces.data()), static_cast<std::size_t>(faces.size()) / 3);
-        return unlocked([&] { return !rows.empty() && !open_edge(rows); });
+        return unlocked([&] { return is_closed(rows); });
       },
       "faces"_a);
   py::class_<ArithmeticContext>(m, "StandardArithmetic")

@@ -157,14 +157,25 @@ struct Detector::Impl {
                             std::to_string(meshes.size()) + ", counted from 0");
     const Scene::Mesh& m = meshes[mesh];
     const std::string subject = std::string(name) + ": '" + m.name + "' ";
-    if (m.n_faces == 0) throw InvalidArgument(subject + "has no faces, and so no inside; give a closed mesh");
+    const auto faces = std::span(common.scene->faces()).subspan(m.first_face, m.n_faces);
+    const auto has_three = [](const auto& f) { return f[0] != f[1] && f[1] != f[2] && f[2] != f[0]; };
     const auto& open = open_edge_of(mesh);
-    if (!open) return;
-    throw InvalidArgument(subject + "is not closed: the edge between its vertices " +
-                          std::to_string((*open)[0] - m.first_vertex) + " and " +
-                          std::to_string((*open)[1] - m.first_vertex) +
-                          " is not in exactly two faces of opposite direction; fill its holes, and merge doubled "
-                          "vertices");
+    if (!open && std::ranges::any_of(faces, has_three)) return;
+    if (!open)
+      throw InvalidArgument(subject + "has no faces with three vertices, and so no inside; give a closed mesh");
+    const auto [u, v] = *open;
+    std::vector<std::string> around;  // faces at the edge
+    for (std::uint32_t i = 0; i < m.n_faces; ++i)
+      if (has_three(faces[i]) && std::ranges::count(faces[i], u) && std::ranges::count(faces[i], v))
+        around.push_back(std::to_string(i));
+    const std::string at = "is not closed: the edge between its vertices " + std::to_string(u - m.first_vertex) +
+                           " and " + std::to_string(v - m.first_vertex) + " is ";
+    if (around.size() == 1)
+      throw InvalidArgument(subject + at + "in one face; fill the hole, or merge vertices at the same position");
+    if (around.size() == 2)
+      throw InvalidArgument(subject + at + "in the faces " + around[0] + " and " + around[1] +
+                            ", which are oriented differently; reverse one of them");
+    throw InvalidArgument(subject + at + "in " + std::to_string(around.size()) + " faces; leave two of them");
   }
 
   // Found once for each mesh.

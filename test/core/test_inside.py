@@ -222,6 +222,7 @@ def test_cancelled_queries_end():
 
 def check_signed(vertices, faces, points, within=1e-12):
     signed = detector((vertices, faces)).signed_distances(vertices, points, 0)
+    assert signed == detector((vertices, faces)).signed_distances(vertices, points, 0)
     numbers, on_surface = expected_windings(vertices, faces, points)
     assert np.array_equal(np.sign(signed.distance), np.where(on_surface, 0, np.where(numbers != 0, -1, 1)))
     for i, p in enumerate(np.asarray(points, float)):
@@ -329,6 +330,7 @@ def test_faces_are_numbered_in_the_scene():
 
 def test_closed():
     assert hc.closed(BOX_FACES) and not hc.closed(BOX_FACES[1:]) and not hc.closed([])
+    assert not hc.closed([(0, 0, 0)]) and not hc.closed([(0, 0, 1), (2, 2, 2)])
     assert not hc.closed([(0, 1, 2), (0, 1, 3), (1, 2, 3), (0, 3, 2)])  # one face turned over
     assert not hc.closed(np.concatenate([BOX_FACES, BOX_FACES]))  # each edge in four faces
     assert hc.closed([*TETRAHEDRON.tolist(), (0, 0, 1)])
@@ -345,10 +347,18 @@ def test_errors(query):
         ask(BOX, [[0.0, 0, 0], [0, 0, math.nan]], 0)
     with pytest.raises(ValueError, match=r"points\[0, 0\] is 1e\+301, beyond 1e\+300"):
         ask(BOX, [[1e301, 0, 0]], 0)
-    with pytest.raises(ValueError, match="'mesh0' is not closed: the edge between its vertices 0 and 1 "):
+    with pytest.raises(ValueError, match="'mesh0' is not closed: the edge between its vertices 0 and 1 is in one face"):
         getattr(detector((BOX[:3], [[0, 1, 2]])), query)(BOX[:3], [[0.0, 0, 0]], 0)
-    with pytest.raises(ValueError, match="'mesh0' has no faces"):
-        getattr(detector((BOX, np.empty((0, 3), int))), query)(BOX, [[0.0, 0, 0]], 0)
+    turned = [*TETRAHEDRON[:3].tolist(), TETRAHEDRON[3][::-1].tolist()]
+    with pytest.raises(ValueError, match="in the faces [0-2] and 3, which are oriented differently; reverse one"):
+        getattr(detector((BOX[:4], turned)), query)(BOX[:4], [[0.0, 0, 0]], 0)
+    with pytest.raises(ValueError, match="between its vertices 0 and 1 is in 3 faces; leave two of them"):
+        getattr(detector((BOX[:5], [[0, 1, 2], [1, 0, 3], [0, 1, 4]])), query)(BOX[:5], [[0.0, 0, 0]], 0)
+    with pytest.raises(TypeError, match="mesh: expected the name or number of a mesh, got ndarray"):
+        ask(BOX, 0, BOX)
+    for faces in (np.empty((0, 3), int), [[0, 0, 1]]):
+        with pytest.raises(ValueError, match="'mesh0' has no faces"):
+            getattr(detector((BOX, faces)), query)(BOX, [[0.0, 0, 0]], 0)
     with pytest.raises(ValueError, match=r"points: expected shape \(2, K, 3\), got \(4, 3\)"):
         worlds = detector((BOX, BOX_FACES), worlds=2)
         getattr(worlds, query)(np.stack([BOX, BOX]), np.zeros((4, 3)), 0)

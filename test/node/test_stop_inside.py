@@ -201,8 +201,8 @@ def test_a_node(start_stream, tmp_path, hpccd):
     assert done.returncode == 0 and "6 results about distances are equal" in done.stdout, done.stdout + done.stderr
 
 
-def test_a_node_with_an_open_mesh(start_stream):
-    """It warns once."""
+def test_a_node_with_an_open_mesh(start_stream, hpccd):
+    """It warns once, and its status names the mesh."""
     stream = start_stream(stop_distance=DISTANCE)
     balls = NodeStream(stream, FACES[1:])
     for _ in range(3):
@@ -212,3 +212,5 @@ def test_a_node_with_an_open_mesh(start_stream):
     assert values["not_closed"] == "table"
     (warning,) = [line for line in stream.node.output().splitlines() if "not closed" in line]
     assert "[WARN]" in warning and "stop: table: not closed, so stop cannot tell whether a mesh is inside" in warning
+    done = hpccd("status", f"{stream.node.namespace}/hpccd")
+    assert "not closed, so whether a mesh is inside is unknown: table" in done.stdout, done.stdout + done.stderr

@@ -14,13 +14,15 @@ struct FaceSide {
   auto operator<=>(const FaceSide&) const = default;
 };
 
+bool has_three(const std::array<std::uint32_t, 3>& f) { return f[0] != f[1] && f[1] != f[2] && f[2] != f[0]; }
+
 }  // namespace
 
 std::optional<std::array<std::uint32_t, 2>> open_edge(std::span<const std::array<std::uint32_t, 3>> faces) {
   std::vector<FaceSide> sides;
   sides.reserve(3 * faces.size());
   for (const auto& f : faces) {
-    if (f[0] == f[1] || f[1] == f[2] || f[2] == f[0]) continue;
+    if (!has_three(f)) continue;
     for (int i = 0; i < 3; ++i) {
       const std::uint32_t a = f[i], b = f[(i + 1) % 3];
       sides.push_back({std::min(a, b), std::max(a, b), a < b});
@@ -36,6 +38,10 @@ std::optional<std::array<std::uint32_t, 2>> open_edge(std::span<const std::array
       return std::array{sides[i].low, sides[i].high};
   }
   return std::nullopt;
+}
+
+bool is_closed(std::span<const std::array<std::uint32_t, 3>> faces) {
+  return std::ranges::any_of(faces, has_three) && !open_edge(faces);
 }
 
 std::vector<std::uint32_t> connected_components(const Features& features) {

@@ -17,6 +17,9 @@ namespace hpccd {
 // twice is an edge and does not count.
 std::optional<std::array<std::uint32_t, 2>> open_edge(std::span<const std::array<std::uint32_t, 3>> faces);
 
+// Whether it is closed and has a face with three vertices.
+bool is_closed(std::span<const std::array<std::uint32_t, 3>> faces);
+
 // For each vertex of the scene, the lowest vertex that is connected with it by edges.
 std::vector<std::uint32_t> connected_components(const Features& features);
 

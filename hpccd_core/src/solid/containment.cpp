@@ -61,7 +61,7 @@ Containment::Containment(const Scene& scene, const Features& features, const Mes
   for (std::uint32_t m = 0; m < closed_.size(); ++m) {
     const Scene::Mesh& mesh = scene.meshes()[m];
     const std::span faces(features.faces);
-    closed_[m] = paired[m] && mesh.n_faces > 0 && !open_edge(faces.subspan(mesh.first_face, mesh.n_faces));
+    closed_[m] = paired[m] && is_closed(faces.subspan(mesh.first_face, mesh.n_faces));
     for (std::uint32_t v = mesh.first_vertex; paired[m] && v < mesh.first_vertex + mesh.n_vertices; ++v)
       if (component[v] == v) vertices_.push_back(v);
     first_.push_back(static_cast<std::uint32_t>(vertices_.size()));

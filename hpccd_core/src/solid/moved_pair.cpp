@@ -42,7 +42,7 @@ MeshTopology topology_of(const Scene& scene, std::uint32_t number) {
       lowest[std::max(v, w)] = std::min(v, w);
       seen[face[i] - mesh.first_vertex] = true;
     }
-  MeshTopology topology{!open_edge(faces), {}};
+  MeshTopology topology{is_closed(faces), {}};
   for (std::uint32_t v = 0; v < lowest.size(); ++v)
     if (seen[v] && lowest[v] == v) topology.representatives.push_back(mesh.first_vertex + v);
   return topology;
