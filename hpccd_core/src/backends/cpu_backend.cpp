@@ -309,8 +309,8 @@ MovedPair CpuBackend::moved_pair(Positions vertices, std::array<std::uint32_t, 2
   topologies_.resize(shared_.scene->meshes().size());
   for (const std::uint32_t mesh : meshes)
     if (!topologies_[mesh]) topologies_[mesh] = topology_of(*shared_.scene, mesh);
-  return {shared_.tree.tree(),     shared_.tree.motion(),   shared_.features,    meshes,
-          *topologies_[meshes[0]], *topologies_[meshes[1]], shared_.cancellation};
+  return {shared_.tree.tree(),     shared_.tree.motion(),   shared_.features, meshes,
+          *topologies_[meshes[0]], *topologies_[meshes[1]], shared_.pool};
 }
 
 std::optional<double> CpuBackend::separating_translation(Positions vertices, std::array<std::uint32_t, 2> meshes,

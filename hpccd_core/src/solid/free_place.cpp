@@ -165,19 +165,24 @@ class DeepestVertexSearch {
       constexpr std::size_t n_samples = 64;
       const std::size_t every = mesh.faces.size() / n_samples + 1;
       for (std::size_t i = every / 2; contains(of_a) && i < mesh.faces.size(); i += every)
-        consider(mesh.faces[i][0], {INFINITY, 0, of_a, false, {}});
+        consider(mesh.faces[i][0], {INFINITY, 0, of_a, false, false, {}});
     }
     for (const bool of_a : {true, false})
       if (contains(of_a))
-        for (const std::uint32_t n : inner(of_a).roots) push(n, {INFINITY, n, of_a, false, {}});
+        for (const std::uint32_t n : inner(of_a).roots) push(n, {INFINITY, n, of_a, false, false, {}});
     std::uint32_t steps = 0;
     while (!heap_.empty() && heap_.front().most > best_) {
       if (++steps % 64 == 0) pair_.heed();
-      const Entry top = heap_.front();
+      Entry top = heap_.front();
       std::pop_heap(heap_.begin(), heap_.end());
       heap_.pop_back();
+      if (!top.has_own_near) {
+        if (find_near(top)) put(top);
+        continue;
+      }
       const BoxedMesh& mesh = inner(top.of_a);
       const BoxedMesh::Node& node = mesh.nodes[top.node];
+      top.has_own_near = false;
       if (node.children) push(node.children, top), push(node.children + 1, top);
       for (std::uint32_t i = node.first_face; i < node.end_face; ++i)
         for (const std::uint32_t v : mesh.faces[i]) consider(v, top);
@@ -191,7 +196,8 @@ class DeepestVertexSearch {
     double most;  // depth; infinite before anything is known
     std::uint32_t node;
     bool of_a, all_inside;
-    V near;  // a point of the outer surface
+    bool has_own_near;  // or else that of its parent
+    V near;             // a point of the outer surface
     bool operator<(const Entry& other) const { return most < other.most; }
   };
 
@@ -217,30 +223,51 @@ class DeepestVertexSearch {
     way_out_ = of.of_a ? q.at - x : x - q.at;
   }
 
+  void put(const Entry& entry) { heap_.push_back(entry), std::push_heap(heap_.begin(), heap_.end()); }
+
   void push(std::uint32_t n, const Entry& parent) {
-    const BoxedMesh::Box& box = inner(parent.of_a).nodes[n].box;
-    if (!overlaps_outer(box, parent.of_a)) return;
-    const auto most_from = [&](const V& q) {
-      const auto most = [](double low, double high, double at) { return std::max(high - at, at - low); };
-      return length(
-          {most(box.low.x, box.high.x, q.x), most(box.low.y, box.high.y, q.y), most(box.low.z, box.high.z, q.z)});
-    };
+    if (!overlaps_outer(inner(parent.of_a).nodes[n].box, parent.of_a)) return;
     Entry entry = parent;
     entry.node = n;
-    if (parent.most < INFINITY) entry.most = std::min(parent.most, most_from(parent.near));
-    if (entry.most <= best_) return;
+    if (parent.most < INFINITY) entry.most = std::min(parent.most, farthest(entry));
+    if (entry.most > best_) put(entry);
+  }
+
+  // From the point `near`, of all that is in the node.
+  double farthest(const Entry& of) const {
+    const BoxedMesh& mesh = inner(of.of_a);
+    const BoxedMesh::Node& node = mesh.nodes[of.node];
+    const auto most = [](double low, double high, double at) { return std::max(high - at, at - low); };
+    const V corner{most(node.box.low.x, node.box.high.x, of.near.x), most(node.box.low.y, node.box.high.y, of.near.y),
+                   most(node.box.low.z, node.box.high.z, of.near.z)};
+    double square = dot(corner, corner);
+    if (!node.children && square > best_ * best_) {
+      square = 0;
+      for (std::uint32_t i = node.first_face; i < node.end_face; ++i)
+        for (const std::uint32_t v : mesh.faces[i]) {
+          const V d = pair_.position(v) - of.near;
+          square = std::max(square, dot(d, d));
+        }
+    }
+    return std::sqrt(square);
+  }
+
+  // Whether anything in the node may be inside and deeper than the best.
+  bool find_near(Entry& entry) {
+    const BoxedMesh::Box& box = inner(entry.of_a).nodes[entry.node].box;
     const V half = 0.5 * (box.high - box.low), middle = box.low + half;
     const double radius = 1.0000001 * length(half) + 1e-15, slack = 0.25 * radius;
     // Nearer than best - radius, nothing in the box is deeper than the best.
-    const NearPoint q = nearest(outer(parent.of_a), middle, known(middle, parent), slack, best_ - radius);
-    entry.near = q.at, entry.most = std::min(entry.most, most_from(q.at));
-    if (entry.most <= best_) return;
+    const NearPoint q = nearest(outer(entry.of_a), middle, known(middle, entry), slack, best_ - radius);
+    if (q.distance <= best_ - radius) return false;
+    entry.near = q.at, entry.most = std::min(entry.most, farthest(entry)), entry.has_own_near = true;
+    if (entry.most <= best_) return false;
     // No surface within the radius: all inside or all outside.
     if (!entry.all_inside && q.distance - slack > radius) {
-      if (!inside((1 / pair_.scale()) * middle, parent.of_a)) return;
+      if (!inside((1 / pair_.scale()) * middle, entry.of_a)) return false;
       entry.all_inside = true;
     }
-    heap_.push_back(entry), std::push_heap(heap_.begin(), heap_.end());
+    return true;
   }
 
   // A point of a surface that is at most `slack` farther than the nearest one, or nearer than `enough`. best: a

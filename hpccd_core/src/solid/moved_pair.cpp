@@ -50,8 +50,8 @@ MeshTopology topology_of(const Scene& scene, std::uint32_t number) {
 
 MovedPair::MovedPair(const Tree& tree, const MotionBounds& snapshot, const Features& features,
                      std::array<std::uint32_t, 2> meshes, const MeshTopology& a, const MeshTopology& b,
-                     const Cancellation& cancellation)
-    : snapshot_(snapshot), cancellation_(cancellation) {
+                     ThreadPool& pool)
+    : snapshot_(snapshot), cancellation_(pool.cancellation()) {
   meshes_[0].topology = &a, meshes_[1].topology = &b;
   double largest = 0;
   for (const std::size_t side : {0u, 1u}) {
@@ -59,10 +59,10 @@ MovedPair::MovedPair(const Tree& tree, const MotionBounds& snapshot, const Featu
     for (int k = 0; k < 3; ++k) largest = std::max({largest, std::fabs(extent.low[k]), std::fabs(extent.high[k])});
   }
   if (largest > 0) scale_ = std::ldexp(1.0, std::min(-1 - std::ilogb(largest), 1000));
-  for (const std::size_t side : {0u, 1u}) {
+  parallel_for_each(pool, 2, [&](std::size_t side) {
     copy(meshes_[side], tree, features, meshes[side]);
     fit(meshes_[side]);
-  }
+  });
 }
 
 void MovedPair::copy(BoxedMesh& mesh, const Tree& tree, const Features& features, std::uint32_t number) const {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/cancellation.h"
+#include "base/parallel.h"
 #include "base/vec3.h"
 #include "bvh/motion_bounds.h"
 #include "bvh/tree.h"
@@ -60,8 +61,7 @@ class MovedPair {
  public:
   // The arguments must outlive the object.
   MovedPair(const Tree& tree, const MotionBounds& snapshot, const Features& features,
-            std::array<std::uint32_t, 2> meshes, const MeshTopology& a, const MeshTopology& b,
-            const Cancellation& cancellation);
+            std::array<std::uint32_t, 2> meshes, const MeshTopology& a, const MeshTopology& b, ThreadPool& pool);
 
   const BoxedMesh& a() const { return meshes_[0]; }
   const BoxedMesh& b() const { return meshes_[1]; }
