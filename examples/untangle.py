@@ -114,17 +114,32 @@ def untangle(meshes, most_iterations):
     return x, iteration, first, hits
 
 
+def layers(faces):
+    """The faces of the upper and of the lower layer of the folded cloth, for pictures."""
+    upper = np.arange(len(faces)) // 2 % 40 < 20
+    return faces[upper], faces[~upper]
+
+
 def save_picture(path, name, meshes, x, first, last):
     from hpccd_ros.picture import panels
 
     before = [vertices for vertices, *_ in meshes.values()]
     after = np.split(x, np.cumsum([len(vertices) for vertices in before])[:-1])
     no_edges = np.empty((0, 2), int)
+    # Both pictures show the surroundings of the curves before.
+    low, high = first.points.min(axis=0), first.points.max(axis=0)
+    margin = 0.5 * (high - low).max()
+    framed = np.stack(np.meshgrid(*np.stack([low - margin, high + margin], axis=1)), axis=-1).reshape(-1, 3)
     drawn = [
         panels.Panel(
             f"{name}, {when}: {len(hits)} intersections",
-            [(mesh, v, f, no_edges) for v, (mesh, (_, f, _)) in zip(places, meshes.items(), strict=True)],
+            [
+                (f"{mesh}{layer}", v, part, no_edges)
+                for v, (mesh, (_, f, _)) in zip(places, meshes.items(), strict=True)
+                for layer, part in enumerate(layers(f) if mesh == "cloth" else [f])
+            ],
             contours=hits.contours(),
+            framed=framed,
         )
         for when, places, hits in (("before", before, first), ("after", after, last))
     ]

@@ -6,6 +6,7 @@ the Rerun viewer.
   hpccd view run.mcap --step 30 -o frame.png
   hpccd view run.mcap --every 1 -o frames   write every step as frames/000000.png, ..., for a video
   hpccd view run.mcap --html run.html       write an interactive page that needs no network
+  hpccd view run.mcap --depth               draw how deep meshes penetrate, too
   hpccd view run.mcap --rerun               open the Rerun viewer; without a screen, write run.rrd
   hpccd view run.mcap -o run.rrd            write meshes, contacts, normals and curves for Rerun
 
@@ -52,6 +53,12 @@ def configure(parser):
         metavar="DEG",
         help="view angle above the horizon (default: %(default)s)",
     )
+    parser.add_argument(
+        "--depth",
+        action="store_true",
+        help="an arrow for each pair of meshes that intersect or contain one another: the shortest translation found "
+        "that frees the first one; it may take a second for each pair and step",
+    )
     parser.add_argument("--title", help="default: the name of the file")
     parser.add_argument("--params", metavar="YAML", help="node parameters, instead of those in the recording")
 
@@ -65,6 +72,8 @@ def run(args) -> int:
         raise UserError(f"--azimuth {args.azimuth}: must be a number of degrees")
     if args.html is not None and (args.rerun or args.output is not None):
         raise UserError(f"--html {args.html}: takes neither --rerun nor --output")
+    if args.depth and (args.rerun or str(args.output).endswith(".rrd")):
+        raise UserError("--depth: only pictures and pages have arrows; leave out --depth for Rerun")
     from hpccd_ros.picture import view
 
     return view.main(args)

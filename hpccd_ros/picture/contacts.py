@@ -15,6 +15,7 @@ from matplotlib.patches import Patch
 import hpccd_core as hc
 from hpccd_ros.base.quoting import shortened
 from hpccd_ros.base.whole_file import whole_file
+from hpccd_ros.detect.interpenetration import Depth
 from hpccd_ros.picture import curves
 from hpccd_ros.picture.camera import Camera
 from hpccd_ros.picture.raster import rasterize
@@ -51,6 +52,8 @@ class Picture:
     scene: str = ""  # name, at the right of the title
     intersecting: np.ndarray | None = None
     contours: Sequence[hc.Contour] = ()  # along which meshes intersect
+    depths: Sequence[Depth] = ()
+    unit: float = 1.0  # the length of the unit of the positions
 
 
 @dataclasses.dataclass
@@ -84,7 +87,7 @@ def compose(picture: Picture, history: History | None = None, *, azimuth=-60.0, 
     image, camera, depth = render(picture.meshes, size, azimuth, elevation, contacts, picture.intersecting)
     figure = Figure(figsize=(16, 9), dpi=120, facecolor=BACKGROUND)
     FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.0, 0.13, 0.80, 0.77))
+    axes = figure.add_axes((0.0, 0.13, 0.80, 0.735))
     _draw_scene(axes, image, camera, depth, picture)
     _write_title(figure, picture)
     _draw_times(figure.add_axes((0.845, 0.30, 0.10, 0.52)), picture)
@@ -101,13 +104,20 @@ def _of_drawable_size(picture: Picture) -> Picture:
     exponent = -int(np.frexp(largest)[1])  # of two: no digit changes
     meshes = [(name, np.ldexp(np.asarray(v, np.float64), exponent), *of) for name, v, *of in picture.meshes]
     contours = [dataclasses.replace(c, points=np.ldexp(c.points, exponent)) for c in picture.contours]
-    return dataclasses.replace(picture, meshes=meshes, points=np.ldexp(picture.points, exponent), contours=contours)
+    depths = [
+        dataclasses.replace(d, start=np.ldexp(d.start, exponent), translation=np.ldexp(d.translation, exponent))
+        for d in picture.depths
+    ]
+    points = np.ldexp(picture.points, exponent)
+    unit = float(np.ldexp(1.0, -exponent))
+    return dataclasses.replace(picture, meshes=meshes, points=points, contours=contours, depths=depths, unit=unit)
 
 
-def render(meshes, size, azimuth, elevation, contacts=None, intersecting=None):
+def render(meshes, size, azimuth, elevation, contacts=None, intersecting=None, framed=None):
     """(image (h,w,4) sRGB with alpha, camera, depth (h,w)) of meshes [(name, vertices, faces, edges)].
 
     contacts: (points (N,3), times of impact (N,)), around which surfaces are tinted. intersecting: as of `Picture`.
+    framed: (N,3) points that are in view; None: all.
     """
     vertices = np.concatenate([np.asarray(v, dtype=np.float64) for _, v, *_ in meshes])
     sizes = [len(v) for _, v, *_ in meshes]
@@ -121,7 +131,7 @@ def render(meshes, size, azimuth, elevation, contacts=None, intersecting=None):
     faces = np.concatenate([faces, sides + len(vertices)])
     vertices, colours = np.concatenate([vertices, around]), np.concatenate([colours, colours[coloured_as]])
     large = (size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING)
-    camera = Camera(vertices, large, azimuth, elevation)
+    camera = Camera(vertices if framed is None else framed, large, azimuth, elevation)
     buffers = rasterize(camera.project(vertices)[faces], large)
     light = LIGHT @ np.array(
         [
@@ -186,6 +196,7 @@ def _draw_scene(axes, image, camera, depth, picture):
     axes.imshow(image, extent=(0, image.shape[1], image.shape[0], 0), interpolation="lanczos")
     axes.set_axis_off()
     curves.draw(axes, picture.contours, camera, depth, SUPERSAMPLING)
+    curves.draw_depths(axes, picture.depths, camera, SUPERSAMPLING, picture.unit)
     if not len(picture.points):
         return
     seen = camera.project(picture.points)
@@ -216,6 +227,8 @@ def _write_title(figure, picture):
         colours["faces that intersect another mesh"] = INTERSECTING
     if any(len(contour) > 1 for contour in picture.contours):
         colours["intersection curves"] = curves.COLOUR
+    if picture.depths:
+        colours["penetration depth"] = curves.DEPTH
     if len(colours) <= MOST_NAMES:
         figure.legend(
             handles=[Patch(color=colour) for colour in colours.values()],

@@ -1,16 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The curves along which meshes intersect."""
+"""The curves along which meshes intersect, and arrows of how deep."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.patches import FancyArrowPatch
+from matplotlib.patheffects import withStroke
 
 import hpccd_core as hc
+from hpccd_ros.detect.interpenetration import Depth
 from hpccd_ros.picture.camera import Camera
 
 COLOUR = "#ff5f45"
+DEPTH = "#ffffff"
+MOST_LENGTHS = 12  # written beside arrows; more would cover each other
 
 
 def draw(axes: Axes, contours: Sequence[hc.Contour], camera: Camera, depth: np.ndarray, scale: float = 1.0) -> None:
@@ -30,3 +35,18 @@ def draw(axes: Axes, contours: Sequence[hc.Contour], camera: Camera, depth: np.n
     for which, alpha in ((hidden, 0.45), (~hidden, 1.0)):
         lines = seen[which, :, :2] / scale
         axes.add_collection(LineCollection(lines, colors=COLOUR, linewidths=1.6, alpha=alpha, capstyle="round"))
+
+
+def draw_depths(axes: Axes, depths: Sequence[Depth], camera: Camera, scale: float = 1.0, unit: float = 1.0) -> None:
+    """Draw an arrow for each depth, in front of everything, as most begin inside a mesh; of few with their lengths.
+
+    scale: pixels of the camera in a unit of the axes. unit: the length of the unit of the positions, for the text.
+    """
+    outline = [withStroke(linewidth=4.0, foreground="#10141c")]
+    for depth in depths:
+        start, end = camera.project(np.stack([depth.start, depth.end]))[:, :2] / scale
+        style = {"arrowstyle": "-|>", "mutation_scale": 13, "shrinkA": 0, "shrinkB": 0, "linewidth": 1.8}
+        axes.add_patch(FancyArrowPatch(start, end, color=DEPTH, path_effects=outline, zorder=4, **style))
+        if len(depths) <= MOST_LENGTHS:
+            text = axes.annotate(f"{unit * depth.length:.3g}", end, (7, 5), textcoords="offset points", zorder=5)
+            text.set(color=DEPTH, fontsize=10, path_effects=outline)

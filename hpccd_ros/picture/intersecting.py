@@ -1,37 +1,36 @@
 # SPDX-License-Identifier: Apache-2.0
 """Faces that intersect another mesh: they are drawn in a colour of their own, as without it a body that pokes through
-a cloth looks like flecks."""
+a cloth looks like flecks. And the curves along which meshes intersect, and how deep."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 import hpccd_core as hc
+from hpccd_ros.detect.interpenetration import Depth, InterpenetrationDetector
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.types import Topology
 
 
 class IntersectingFaces:
-    """In the states of one scene. Pairs that the scene ignores count as apart."""
+    """In the states of one scene. Pairs that the scene ignores count as apart.
 
-    def __init__(self, builder: SceneBuilder) -> None:
-        self._builder = builder.between_meshes
-        self._topologies: tuple[Topology, ...] = ()
-        self._detector: hc.Detector | None = None
-        self._hits: hc.Intersections | None = None
+    ``contours``, ``depths``: the curves along which meshes intersected in the last call of `of`, and the translations
+    that separate them. depth: whether these are searched, which may take a second for each pair.
+    """
 
-    @property
-    def contours(self) -> list[hc.Contour]:
-        """The curves along which meshes intersected in the last call of `of`."""
-        return [] if self._hits is None else self._hits.contours()
+    def __init__(self, builder: SceneBuilder, *, depth: bool = False) -> None:
+        self._detector = InterpenetrationDetector(builder)
+        self._depth = depth
+        self.contours: list[hc.Contour] = []
+        self.depths: list[Depth] = []
 
     def of(self, topologies: tuple[Topology, ...], vertices: Sequence[np.ndarray]) -> list[np.ndarray]:
         """(F,) bool for each mesh: faces that an edge of another mesh intersects, or whose edge intersects one."""
-        if self._detector is None or topologies != self._topologies:
-            scene = self._builder.build(topologies)
-            self._topologies, self._detector = topologies, hc.Detector(scene, outputs=("points",))
-        hits = self._detector.intersections(np.concatenate([np.asarray(v, np.float64) for v in vertices]))
-        found, self._hits = hits.ef, hits
+        hits = self._detector.intersections(topologies, vertices)
+        self.contours = hits.contours()
+        self.depths = self._detector.depths(topologies, vertices, hits) if self._depth else []
+        found = hits.ef[np.asarray(hits.mesh_a) != np.asarray(hits.mesh_b)]
         firsts = np.cumsum([0, *(topology.n_vertices for topology in topologies)])
         faces = np.concatenate([t.faces.astype(np.int64) + first for t, first in zip(topologies, firsts, strict=False)])
         marked = np.zeros(len(faces), bool)

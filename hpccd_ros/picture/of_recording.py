@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures of the steps of a replayed recording."""
 
+from collections.abc import Sequence
+from typing import TypeVar
+
 import numpy as np
 
 import hpccd_core as hc
 from hpccd_core.options import FEATURES
+from hpccd_ros.detect.interpenetration import Depth
 from hpccd_ros.detect.separation import Separation
 from hpccd_ros.picture import contacts as picture
 from hpccd_ros.picture.intersecting import IntersectingFaces
 from hpccd_ros.picture.visual_geometry import NO_VISUAL, VisualGeometry
 from hpccd_ros.replay.recomputed import ReplayedStep
+
+Between = TypeVar("Between", hc.Contour, Depth)
 
 
 class History:
@@ -47,7 +53,8 @@ def draw_step(
         facts(step),
         title,
         intersecting=marked,
-        contours=[] if intersecting is None else _seen(intersecting, step, meshes),
+        contours=[] if intersecting is None else _seen(intersecting.contours, step, meshes),
+        depths=[] if intersecting is None else _seen(intersecting.depths, step, meshes),
     )
     context = None
     if history is not None and len(history.steps) > 1:
@@ -101,11 +108,11 @@ def _marked(intersecting: IntersectingFaces, step: ReplayedStep, meshes) -> np.n
     )
 
 
-def _seen(intersecting: IntersectingFaces, step: ReplayedStep, meshes) -> list[hc.Contour]:
-    """The curves between meshes that are drawn as they are tested, not by visual geometry."""
+def _seen(found: Sequence[Between], step: ReplayedStep, meshes) -> list[Between]:
+    """Those between meshes that are drawn as they are tested, not by visual geometry."""
     tested = dict(zip(step.layout.mesh_names, step.end_frame.topologies, strict=True))
     drawn = {name for name, _, faces, _ in meshes if name in tested and tested[name].faces is faces}
-    return [contour for contour in intersecting.contours if {contour.mesh_a, contour.mesh_b} <= drawn]
+    return [between for between in found if {between.mesh_a, between.mesh_b} <= drawn]
 
 
 def meshes_in_the_middle(step: ReplayedStep, visual: VisualGeometry = NO_VISUAL):

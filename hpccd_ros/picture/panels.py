@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 import hpccd_core as hc
 from hpccd_ros.base.whole_file import whole_file
+from hpccd_ros.detect.interpenetration import Depth
 from hpccd_ros.picture import curves
 from hpccd_ros.picture.contacts import BACKGROUND, INK, INTERSECTING, SUPERSAMPLING, as_bytes, render
 
@@ -26,6 +27,8 @@ class Panel:
     meshes: list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]
     intersecting: np.ndarray | None = None
     contours: Sequence[hc.Contour] = ()
+    depths: Sequence[Depth] = ()
+    framed: np.ndarray | None = None  # (N,3) points that are in view; None: all
 
 
 def save(
@@ -41,12 +44,15 @@ def save(
     figure = Figure(figsize=(columns * size[0] / 100, rows * (size[1] + 40) / 100), dpi=100, facecolor=BACKGROUND)
     FigureCanvasAgg(figure)
     for number, panel in enumerate(panels):
-        image, camera, depth = render(panel.meshes, size, azimuth, elevation, intersecting=panel.intersecting)
+        image, camera, depth = render(
+            panel.meshes, size, azimuth, elevation, intersecting=panel.intersecting, framed=panel.framed
+        )
         axes = figure.add_subplot(rows, columns, number + 1)
         axes.imshow(image, extent=(0, size[0], size[1], 0))
         axes.set_axis_off()
         axes.set_title(panel.title, color=INK, fontsize=10)
         curves.draw(axes, panel.contours, camera, depth, SUPERSAMPLING)
+        curves.draw_depths(axes, panel.depths, camera, SUPERSAMPLING)
         if panel.intersecting is not None and panel.intersecting.any():
             what = "bright green: faces that intersect another mesh"
             axes.text(0.5, -0.01, what, transform=axes.transAxes, ha="center", va="top", color=INTERSECTING, fontsize=8)

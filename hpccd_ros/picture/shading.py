@@ -8,6 +8,7 @@ from hpccd_ros.picture.camera import LightCamera
 from hpccd_ros.picture.raster import rasterize
 
 SHADOW_RESOLUTION = 1200
+FILL = 0.3
 SKY = np.array([0.93, 0.97, 1.04], dtype=np.float32)
 SUN = np.array([1.05, 1.0, 0.92], dtype=np.float32)
 
@@ -47,8 +48,10 @@ def shade(buffers, camera, vertices, faces, colours, light, paint):
     half = light + view
     _normalize(half)
     gloss = np.clip(_dot(normal, half), 0, 1) ** 40
-    rim = (1 - np.clip(_dot(normal, view), 0, 1)) ** 4
-    sky = 0.34 + 0.18 * normal[:, 2] + 0.10 * rim
+    facing = np.clip(_dot(normal, view), 0, 1)
+    rim = (1 - facing) ** 4
+    # A weak light at the camera: what turns away from sun and sky is not black.
+    sky = 0.34 + 0.18 * normal[:, 2] + 0.10 * rim + FILL * facing
     sun = 0.80 * np.clip(normal @ light, 0, 1) * lit
     energy = (sky * crease)[:, None] * SKY + (sun * (0.45 + 0.55 * crease))[:, None] * SUN
     base = paint(position, triangle, _interpolate(colours, faces, triangle, weights))

@@ -37,7 +37,7 @@ def main(args) -> int:
         steps = (s for s in replay.steps() if s.contacts is not None)
         view["visual"] = VisualGeometry(setup.visual())
         if not in_rerun:
-            view["intersecting"] = IntersectingFaces(setup.builder)
+            view["intersecting"] = IntersectingFaces(setup.builder, depth=args.depth)
         if in_rerun:
             _show_in_rerun(args, steps, source, title, view)
         elif args.every is None:

@@ -25,6 +25,7 @@ MISTAKES = {
     ("replay", "BAG", "--from", "5", "--to", "2"): "--to not before --from",
     ("view", "BAG", "--every", "0"): "--every 0: must be at least 1",
     ("view", "BAG", "--elevation", "100"): "--elevation 100.0: must lie between -89.9 and 89.9 degrees",
+    ("view", "BAG", "--depth", "-o", "run.rrd"): "--depth: only pictures and pages have arrows; leave out --depth for",
     ("cut", "BAG", "-o", "part.mcap"): "nothing to cut: give --from TIME, --to TIME or both",
     ("cut", "BAG", "--to", "1", "-o", "part"): "-o part: must end in .mcap",
     ("cut", "BAG", "--from", "0", "-o", "no/part.mcap"): "-o no/part.mcap: there is no folder no; create it\n",

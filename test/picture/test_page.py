@@ -17,6 +17,7 @@ from page_parts import Page
 
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.detect.interpenetration import InterpenetrationDetector
 from hpccd_ros.frames.types import Topology
 from hpccd_ros.picture.page import packing, recording_page
 from hpccd_ros.picture.page.document import document, three
@@ -88,6 +89,38 @@ def test_what_the_page_holds_is_what_was_recorded(hpccd, small_bag, tmp_path):
     assert page.said["notes"] == ["Each 4th step of the recording is shown (--every 4)."]
     sides = [np.subtract(mesh["high"], mesh["low"]).max() for mesh in page.said["meshes"]]
     assert [mesh["step"] for mesh in page.said["meshes"]] == pytest.approx([side / 65535 for side in sides])
+
+
+@pytest.mark.parametrize("depth", [False, True])
+def test_curves_and_depths_of_each_step(hpccd, small_bag, tmp_path, depth, monkeypatch):
+    done = hpccd("view", small_bag, "--html", "run.html", "--every", 20, *["--depth"] * depth)
+    assert done.returncode == 0, done.stderr
+    page, steps = Page(tmp_path / "run.html"), steps_of(small_bag)[::20]
+    with Recording(small_bag) as recording:
+        detector = InterpenetrationDetector(recorded_setup.of_recording(recording).builder)
+    found = 0
+    for number, step in enumerate(steps):
+        scene = step.end_frame.topologies, step.end_frame.vertices
+        hits = detector.intersections(*scene)
+        lines, arrows = page.curves(number)
+        expected = [np.concatenate([c.points, c.points[: c.closed]]) for c in hits.contours() if len(c) > 1]
+        assert [len(line) for line in lines] == [len(line) for line in expected]
+        for line, of_detector in zip(lines, expected, strict=True):
+            assert within(line, of_detector, page.said["curves"]["step"])
+        depths = detector.depths(*scene, hits) if depth else []
+        names = [mesh["name"] for mesh in page.said["meshes"]]
+        assert [[names[a], names[b], length] for a, b, length in page.said["steps"][number]["depths"]] == [
+            [d.mesh_a, d.mesh_b, f"{d.length:.3g}"] for d in depths
+        ]
+        for arrow, of_detector in zip(arrows, depths, strict=True):
+            assert within(arrow, np.stack([of_detector.start, of_detector.end]), page.said["curves"]["step"])
+        found += len(lines) + 1000 * len(depths)
+    assert found > 10 and (found > 1000) == depth
+
+    monkeypatch.setattr(packing, "MOST_OF_CURVES", 30)
+    thinned = packing.Curves()
+    count, points = thinned.add(hits.contours(), [])
+    assert 0 < count <= points <= 30
 
 
 def test_links_of_robots_are_shown(hpccd, tmp_path):

@@ -340,6 +340,52 @@ def test_faces_that_intersect_another_mesh_have_a_colour_of_their_own(browser, h
     assert green > 2 * red, "as dark as in the legend"
 
 
+def test_curves_and_depths_are_drawn_and_can_be_switched_off(browser, hpccd, small_bag, tmp_path):
+    assert hpccd("view", small_bag, "--step", "45", "--depth", "--html", "run.html").returncode == 0
+    page = Page(tmp_path / "run.html")
+    (depth,) = page.said["steps"][0]["depths"]
+    scene = opened(browser, tmp_path / "run.html")
+    for name in ("show-contacts", "show-tint", "show-intersecting"):
+        browser.evaluate(f"document.getElementById('{name}').click()")
+    for mesh in (0, 1):
+        scene.show(mesh, False)
+    both = scene.pixels()
+    seen = []
+    for name in ("curves", "depth"):
+        assert not browser.evaluate(f"document.getElementById('{name}').hidden")
+        browser.evaluate(f"document.getElementById('show-{name}').click()")
+        pixels = scene.pixels()
+        changed = np.abs(pixels - both).max(axis=2) > 60
+        seen.append((changed.sum(), np.median(both[changed], axis=0)))
+        both = pixels
+    assert not scene.drawn().any(), "nothing else was drawn"
+    (curves, colour), (arrow, white) = seen
+    assert curves > 500 and colour[0] > 1.5 * colour[2], "red"
+    assert 40 < arrow < curves and white.min() > 200
+    assert browser.evaluate("document.getElementById('depths').textContent") == f"cloth out of ball: {depth[2]}"
+    # The tip of the arrow is where the depth ends: three.js projects it with the camera of the page.
+    browser.evaluate("draw = Stage.prototype.draw; Stage.prototype.draw = function () { draw.call(stage = this); }")
+    browser.evaluate("document.getElementById('show-depth').click()")
+    _, ((_, end),) = page.curves(0)
+    rows, columns = np.nonzero((scene.pixels() > 200).all(axis=2))
+    x, y = browser.evaluate(
+        f"(({{recording: r, camera, canvas}}) => {{ const p = new THREE.Vector3(...{end.tolist()}.map((v, k) => "
+        "(v - r.centre[k]) / r.scale)).project(camera.three); "
+        "return [(0.5 + 0.5 * p.x) * canvas.clientWidth, (0.5 - 0.5 * p.y) * canvas.clientHeight]; })(stage)"
+    )
+    away = np.hypot(columns + scene.part[0] - scene.x - x, rows + scene.part[1] - scene.y - y)
+    assert away.min() < 4
+    assert browser.said == []
+
+
+def test_steps_without_curves_say_nothing_of_them(browser, hpccd, small_bag, tmp_path):
+    assert hpccd("view", small_bag, "--step", "1", "--depth", "--html", "run.html").returncode == 0
+    scene = opened(browser, tmp_path / "run.html")
+    assert browser.evaluate("['curves', 'depth'].every((id) => document.getElementById(id).hidden)")
+    assert browser.evaluate("document.getElementById('depths').textContent") == ""
+    assert scene.drawn().any() and browser.said == []
+
+
 def test_the_panel_of_a_scene_with_a_robot_fits_without_scrolling(browser, hpccd, tmp_path):
     options = ("--size", "0.1", "--frames", "5", "--mcap", "arm.mcap")
     assert hpccd("scene", "arm-and-cloth", *options).returncode == 0

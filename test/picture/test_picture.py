@@ -8,10 +8,11 @@ import pytest
 from matplotlib.image import imread
 
 import hpccd_core as hc
+from hpccd_ros.detect.interpenetration import Depth
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.frames.types import NO_EDGES, MeshSettings, Topology
-from hpccd_ros.picture import contacts, panels, tint
+from hpccd_ros.picture import contacts, curves, panels, tint
 from hpccd_ros.picture.camera import Camera
 from hpccd_ros.picture.intersecting import IntersectingFaces
 from hpccd_ros.picture.of_recording import separation_fact
@@ -291,3 +292,68 @@ def test_intersection_curves_in_a_picture(tmp_path):
     assert len(lines) == len(others) == 2
     assert [len(c.get_segments()) for c in lines] == [len(c.get_segments()) for c in others]
     assert sum(len(c.get_segments()) for c in lines) == len(contour)
+
+
+def arrows_of(axes):
+    """[(start, end)] of the arrows of a picture, in units of its axes."""
+    return [patch._posA_posB for patch in axes.patches]
+
+
+def test_depths_are_arrows_with_their_lengths(tmp_path):
+    """Where they project to, whatever the unit, over the surface that they begin behind."""
+    depths = [
+        Depth("body", "plane", np.array([0.1, 0.2, -0.3]), np.array([0.0, 0.1, 0.6])),
+        Depth("other", "plane", np.array([-0.5, 0.2, 0.1]), np.array([0.3, 0.0, 0.0])),
+    ]
+    picture = dataclasses.replace(picture_of(np.zeros((0, 3)), []), depths=depths)
+    camera = Camera(PLANE[1], (640, 400), -60.0, 26.0)
+    for unit in (1.0, 2.0**-120, 2.0**200):
+        name, vertices, *rest = PLANE
+        scaled = dataclasses.replace(
+            picture,
+            meshes=[(name, unit * vertices, *rest)],
+            depths=[dataclasses.replace(d, start=unit * d.start, translation=unit * d.translation) for d in depths],
+        )
+        figure = contacts.compose(scaled, size=(320, 200))
+        scene = figure.axes[0]
+        for (start, end), depth in zip(arrows_of(scene), depths, strict=True):
+            expected = camera.project(np.stack([depth.start, depth.end]))[:, :2] / 2
+            assert np.allclose([start, end], expected, atol=1e-6)
+        lengths = [float(text.get_text()) / unit for text in scene.texts]
+        assert lengths == pytest.approx([depth.length for depth in depths], rel=5e-3)
+        assert figure.legends[0].texts[-1].get_text() == "penetration depth"
+    many = dataclasses.replace(picture, depths=depths[:1] * (curves.MOST_LENGTHS + 1))
+    scene = contacts.compose(many, size=(320, 200)).axes[0]
+    assert len(arrows_of(scene)) == curves.MOST_LENGTHS + 1 and not scene.texts
+
+    def white(name, drawn):
+        panels.save([panels.Panel("plane", [PLANE], depths=drawn)], tmp_path / name, width=480)
+        return int((imread(tmp_path / name)[60:, :, :3] > 0.95).all(axis=2).sum())
+
+    assert white("none.png", ()) == 0 < 60 < white("arrow.png", depths[:1])
+
+
+def test_a_panel_shows_what_it_is_to_frame(tmp_path):
+    seen = []
+    for framed in (None, 0.5 * CORNERS):
+        panels.save([panels.Panel("plane", [PLANE], framed=framed)], tmp_path / "framed.png", width=320)
+        picture = imread(tmp_path / "framed.png")[50:, :, :3]
+        seen.append((np.abs(picture - picture[-1, 0]).max(axis=2) > 0.1).mean())
+    assert seen[1] > 2.5 * seen[0] > 0, "twice as large"
+
+
+def test_no_surface_that_is_seen_is_black():
+    """Turned away from the sun and the sky: from below, and edge-on."""
+    for elevation in (-80, -26, 2):
+        image, *_ = contacts.render([grid(8)], (320, 200), -60, elevation)
+        seen = image[..., 3] > 0.99
+        assert image[seen][:, :3].max(axis=1).min() > 0.15, elevation
+
+
+@pytest.mark.parametrize("options", [(), ("--depth",)])
+def test_depths_of_a_recording(hpccd, small_bag, tmp_path, options):
+    done = hpccd("view", small_bag, "--step", 80, "-o", "step.png", *options)
+    assert done.returncode == 0, done.stderr
+    image = imread(tmp_path / "step.png")
+    part = image[200:1000, 100 : int(0.8 * image.shape[1]), :3]  # where the meshes are
+    assert ((part > 0.97).all(axis=2).sum() > 40) == bool(options)

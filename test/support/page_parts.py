@@ -2,6 +2,7 @@
 """The content of an HTML page of a recording, read without the code that wrote it."""
 
 import base64
+import itertools
 import json
 import zlib
 from html.parser import HTMLParser
@@ -61,6 +62,18 @@ class Page(HTMLParser):
     def _shown(self, mesh, step):
         number, frame = self.said["meshes"][mesh]["shown"][step]
         return self.said["meshes"][mesh]["topologies"][number], number, frame
+
+    def curves(self, step: int) -> tuple[list[np.ndarray], np.ndarray]:
+        """(the points (n,3) of each intersection curve of a step, start and end (D,2,3) of its depths)."""
+        told, steps = self.said["curves"], self.said["steps"]
+        points = self.integers("curves-points", 2, (1, told["count"], 3))[0] * told["step"] + told["low"]
+        lengths = self.integers("curves-lengths", 4, (1, told["lines"], 1))[0, :, 0]
+        before = sum(s["curves"][1] + 2 * len(s["depths"]) for s in steps[:step])
+        first = sum(s["curves"][0] for s in steps[:step])
+        ends = before + np.cumsum([0, *lengths[first : first + steps[step]["curves"][0]]])
+        assert ends[-1] == before + steps[step]["curves"][1]
+        lines = [points[a:b] for a, b in itertools.pairwise(ends)]
+        return lines, points[ends[-1] : ends[-1] + 2 * len(steps[step]["depths"])].reshape(-1, 2, 3)
 
     def contacts(self, step: int) -> dict:
         """meshes (N,2), features (N,4), toc (N,), points (N,3) of a step, and how many are vertex-face."""

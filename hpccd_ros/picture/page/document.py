@@ -47,7 +47,10 @@ def three() -> Library:
 
 
 # In the order in which they use each other.
-SCRIPTS = ("unpack", "recording", "camera", "tint", "surfaces", "contacts", "chart", "times", "viewer")
+SCRIPTS = (
+    *("unpack", "recording", "camera", "tint", "surfaces", "contacts", "ribbons", "curves"),
+    *("chart", "times", "viewer"),
+)
 # JSON may hold these escaped; so nothing of a recording can end the element that holds it, or begin another.
 _ESCAPES = {ord(c): f"\\u{ord(c):04x}" for c in "<>&"}
 

@@ -9,6 +9,8 @@ import numpy as np
 from hpccd.msg import ContactArray
 from numpy.typing import NDArray
 
+import hpccd_core as hc
+from hpccd_ros.detect.interpenetration import Depth, polylines
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.frames.types import Topology
 from hpccd_ros.middleware.contact_messages import FeaturePairs, fill_pairs
@@ -170,3 +172,31 @@ class FaceLists:
 
     def packed(self) -> bytes:
         return packed(np.concatenate(self._faces).reshape(1, -1, 1))
+
+
+# Points of intersection curves that are drawn of one step.
+MOST_OF_CURVES = 4_000
+
+
+class Curves:
+    """The intersection curves of each step, and then the starts and ends of its depths."""
+
+    def __init__(self):
+        self._points: list[np.ndarray] = [np.empty((0, 3))]
+        self._lengths: list[int] = []
+
+    def add(self, contours: Sequence[hc.Contour], depths: Sequence[Depth]) -> tuple[int, int]:
+        """How many curves are drawn of this step, and how many points they have."""
+        lines = polylines(contours, MOST_OF_CURVES)
+        lengths = [len(line) for line in lines]
+        self._points += lines + [np.stack([depth.start, depth.end]) for depth in depths]
+        self._lengths += lengths
+        return len(lengths), sum(lengths)
+
+    def described(self) -> tuple[dict, dict[str, bytes]]:
+        """(what the page says of them, {name: bytes})."""
+        points = np.concatenate(self._points)
+        grid = Grid(points.min(axis=0), points.max(axis=0)) if len(points) else Grid(np.zeros(3), np.zeros(3))
+        lengths = np.array(self._lengths, np.uint32)
+        blobs = {"points": packed(grid.rounded(points)[None]), "lengths": packed(lengths.reshape(1, -1, 1))}
+        return {**grid.described(), "count": len(points), "lines": len(lengths)}, blobs

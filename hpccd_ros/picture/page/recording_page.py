@@ -11,11 +11,12 @@ from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import shortened
 from hpccd_ros.base.whole_file import whole_file
+from hpccd_ros.picture import curves
 from hpccd_ros.picture.contacts import BACKGROUND, FAINT, INK, INTERSECTING, TOC_COLOURS, mesh_colours, mesh_groups
 from hpccd_ros.picture.intersecting import IntersectingFaces
 from hpccd_ros.picture.of_recording import facts
 from hpccd_ros.picture.page.document import document, three
-from hpccd_ros.picture.page.packing import MOST, ContactColumns, FaceLists, MeshPositions
+from hpccd_ros.picture.page.packing import MOST, ContactColumns, Curves, FaceLists, MeshPositions
 from hpccd_ros.picture.tint import RADIUS, STRENGTH
 from hpccd_ros.picture.visual_geometry import NO_VISUAL, VisualGeometry
 from hpccd_ros.replay import recorded_setup
@@ -51,7 +52,7 @@ class RecordingPage:
         # Drawn in place of links; behind the meshes of the scene, whose numbers contacts have.
         self._seen = {name: MeshPositions(name) for name in visual.topologies}
         self._intersecting, self._marked = intersecting, FaceLists()
-        self._contacts = ContactColumns()
+        self._contacts, self._curves = ContactColumns(), Curves()
         self._title, self._every = title, every
         self._view = {"azimuth": azimuth, "elevation": elevation}
         self._steps: list[dict] = []
@@ -75,9 +76,10 @@ class RecordingPage:
         if not shown:
             return
         self._add_positions(step)
-        marked = [np.empty(0, bool)] * len(self._meshes)
+        marked, contours, depths = [np.empty(0, bool)] * len(self._meshes), [], []
         if self._intersecting is not None and step.end_frame is not None:
             marked = self._intersecting.of(step.end_frame.topologies, step.end_frame.vertices)
+            contours, depths = self._drawn(self._intersecting.contours), self._drawn(self._intersecting.depths)
         drawn = (0, 0) if step.contacts is None else self._contacts.add(step.contacts, step.layout)
         self._steps.append(
             {
@@ -86,12 +88,20 @@ class RecordingPage:
                 "total": None if step.contacts is None else step.total,
                 "drawn": drawn,
                 "intersecting": self._marked.add(marked),
+                "curves": self._curves.add(contours, depths),
+                "depths": [
+                    [self._names.index(d.mesh_a), self._names.index(d.mesh_b), f"{d.length:.3g}"] for d in depths
+                ],
                 "milliseconds": None if step.contacts is None else step.milliseconds,
                 "facts": [] if step.contacts is None else [shortened(fact, 100) for fact in facts(step)],
                 "notices": [shortened(notice, 400) for notice in self._notices(step, sum(drawn))],
                 "place": len(self._numbers) - 1,
             }
         )
+
+    def _drawn(self, found):
+        """Those between meshes that are drawn as they are tested, not by visual geometry."""
+        return [between for between in found if not {between.mesh_a, between.mesh_b} & self._visual.topologies.keys()]
 
     def _add_positions(self, step):
         frame = step.end_frame
@@ -158,6 +168,8 @@ class RecordingPage:
         contacts, columns = self._contacts.described()
         blobs |= {f"contacts-{name}": data for name, data in columns.items()}
         blobs["intersecting-faces"] = self._marked.packed()
+        drawn_curves, columns = self._curves.described()
+        blobs |= {f"curves-{name}": data for name, data in columns.items()}
         description = {
             "title": shortened(self._title),
             "view": self._view,
@@ -168,10 +180,13 @@ class RecordingPage:
                 "tint": STRENGTH,
                 "radius": RADIUS,
                 "intersecting": INTERSECTING,
+                "curves": curves.COLOUR,
+                "depth": curves.DEPTH,
                 "toc": [[float(c) for c in TOC_COLOURS(t)[:3]] for t in np.linspace(0.0, 1.0, TOC_SHADES)],
             },
             "meshes": meshes,
             "contacts": contacts,
+            "curves": drawn_curves,
             "steps": [self._with_gap(step, gaps) for step in self._steps],
             "notes": self._notes(sum(gaps)),
         }
@@ -248,7 +263,7 @@ def _page_of(args, source, title, view, every) -> RecordingPage:
         setup = recorded_setup.of_recording(recording, args.params)
         replay = Replay(recording, setup, outputs=("points",), distances=False)
         visual = VisualGeometry(setup.visual())
-        view |= {"visual": visual, "intersecting": IntersectingFaces(setup.builder)}
+        view |= {"visual": visual, "intersecting": IntersectingFaces(setup.builder, depth=args.depth)}
         page = RecordingPage(replay, setup.mesh_names, title, every=every, **view)
         for number, step in enumerate(track(replay.steps(), "steps", True, replay.recorded_results or None)):
             page.add(step, step.step == args.step if args.step is not None else number % every == 0)

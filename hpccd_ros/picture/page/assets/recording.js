@@ -13,8 +13,12 @@ class Recording {
     this.scale = (boxes.length && Math.max(...low.map((value, axis) => 0.5 * high[axis] - 0.5 * value))) || 1;
     this.firstContact = [0];
     this.firstIntersecting = [0];
+    this.firstCurve = [0];
+    this.firstOfCurves = [0]; // points: of the curves of a step, then two of each depth
     for (const step of this.steps) {
       this.firstContact.push(this.firstContact.at(-1) + step.drawn[0] + step.drawn[1]);
+      this.firstCurve.push(this.firstCurve.at(-1) + step.curves[0]);
+      this.firstOfCurves.push(this.firstOfCurves.at(-1) + step.curves[1] + 2 * step.depths.length);
       this.firstIntersecting.push(step.intersecting.reduce((sum, count) => sum + count, this.firstIntersecting.at(-1)));
     }
   }
@@ -29,7 +33,9 @@ class Recording {
       }
     }
     this.intersecting = await unpack("intersecting-faces", 4, 1, this.firstIntersecting.at(-1), 1);
-    const { contacts } = this;
+    const { contacts, curves } = this;
+    curves.lengths = await unpack("curves-lengths", 4, 1, curves.lines, 1);
+    curves.points = await unpack("curves-points", 2, 1, curves.count, 3);
     contacts.meshes = await unpack("contacts-meshes", 4, 1, contacts.count, 2);
     contacts.features = await unpack("contacts-features", 4, 1, contacts.count, 4);
     contacts.toc = await unpack("contacts-toc", 2, 1, 1, contacts.count);
@@ -55,6 +61,18 @@ class Recording {
     const counts = this.steps[step].intersecting;
     const first = counts.slice(0, mesh).reduce((sum, count) => sum + count, this.firstIntersecting[step]);
     return this.intersecting.subarray(first, first + (counts[mesh] ?? 0));
+  }
+
+  // {lines: [[x, y, z], ...] of each intersection curve of a step, depths: [start, end] of each of its depths}
+  curvesOf(step) {
+    const first = this.firstOfCurves[step], end = this.firstOfCurves[step + 1];
+    const flat = new Float32Array(3 * (end - first)), lines = [], depths = [];
+    this.place(this.curves, this.curves.points, first, end, flat);
+    let at = 0;
+    const next = (count) => Array.from({ length: count }, () => [...flat.subarray(at, (at += 3))]);
+    for (let k = this.firstCurve[step]; k < this.firstCurve[step + 1]; k++) lines.push(next(this.curves.lengths[k]));
+    for (const _ of this.steps[step].depths) depths.push(next(2));
+    return { lines, depths };
   }
 
   // Contact `index` of all: {vf, meshes, features, toc, point}.

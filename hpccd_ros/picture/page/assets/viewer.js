@@ -19,7 +19,9 @@ class Stage {
     this.scene = new THREE.Scene();
     this.surfaces = new Surfaces(recording);
     this.contacts = new Contacts(recording);
-    this.scene.add(this.surfaces.group, this.contacts.group, ...this.lights(recording.view.azimuth));
+    this.curves = new Curves(recording);
+    const { group: curves, arrows } = this.curves;
+    this.scene.add(this.surfaces.group, this.contacts.group, curves, arrows, ...this.lights(recording.view.azimuth));
     this.camera = new OrbitCamera(canvas, recording.view.azimuth, recording.view.elevation, () => this.later());
     this.tint = true;
     this.waiting = false;
@@ -43,6 +45,7 @@ class Stage {
     this.step = step;
     this.surfaces.show(step, this.tint);
     this.contacts.show(step);
+    this.curves.show(step);
     if (this.reach && !this.camera.touched && this.widen(step)) this.camera.frame(this.reach);
     this.later();
   }
@@ -63,6 +66,7 @@ class Stage {
   resize() {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     this.renderer.setSize(width, height, false);
+    this.curves.resize(width, height);
     this.camera.three.aspect = width / Math.max(height, 1);
     if (this.framed && !this.camera.touched) this.fit(this.framed);
     this.draw();
@@ -119,6 +123,7 @@ class Stage {
 // The page around it: what is said, and what is pressed.
 class Viewer {
   static FITTED = 6; // steps that the first view frames
+  static LISTED = 4; // depths beside the scene
 
   constructor(recording) {
     this.recording = recording;
@@ -133,7 +138,9 @@ class Viewer {
     this.chart = new Chart(byId("chart"), recording, (step) => this.choose(step));
     this.times = new Times(byId("times"), recording);
     this.listMeshes();
-    document.querySelector("#intersecting .swatch").style.background = recording.colours.intersecting;
+    for (const kind of ["intersecting", "curves", "depth"]) {
+      document.querySelector(`#${kind} .swatch`).style.background = recording.colours[kind];
+    }
     this.writeNotes();
     this.bindControls();
     this.worst = recording.steps.reduce((best, step, i, all) => ((step.total ?? -1) > (all[best].total ?? -1) ? i : best), 0);
@@ -172,6 +179,8 @@ class Viewer {
     for (const id of ["first", "back"]) byId(id).disabled = step === 0;
     for (const id of ["forward", "last"]) byId(id).disabled = step === steps.length - 1;
     byId("intersecting").hidden = !steps[step].intersecting.some(Boolean);
+    byId("curves").hidden = !steps[step].curves[0];
+    this.listDepths(steps[step].depths);
     this.forget();
     this.stage?.show(step);
     this.chart.show(step);
@@ -240,6 +249,14 @@ class Viewer {
       if (this.stage) this.stage.surfaces.withMarks = event.target.checked;
       this.redraw();
     });
+    byId("show-curves").addEventListener("change", (event) => {
+      if (this.stage) this.stage.curves.group.visible = event.target.checked;
+      this.redraw();
+    });
+    byId("show-depth").addEventListener("change", (event) => {
+      if (this.stage) this.stage.curves.arrows.visible = event.target.checked;
+      this.redraw();
+    });
     byId("show-edges").addEventListener("change", (event) => {
       if (this.stage) this.stage.surfaces.withEdges = event.target.checked;
       this.redraw();
@@ -279,6 +296,16 @@ class Viewer {
       entry.append(label);
       return entry;
     }));
+  }
+
+  // The largest first.
+  listDepths(depths) {
+    const names = this.recording.meshes.map((mesh) => mesh.name);
+    const largest = [...depths].sort((a, b) => Number(b[2]) - Number(a[2])), listed = largest.slice(0, Viewer.LISTED);
+    const lines = listed.map(([a, b, length]) => item(`${names[a]} out of ${names[b]}: ${length}`));
+    const others = depths.length - listed.length;
+    byId("depth").hidden = !depths.length;
+    byId("depths").replaceChildren(...lines, ...(others ? [item(`${others} more`)] : []));
   }
 
   writeNotes() {
