@@ -31,7 +31,7 @@ SUBJECTS = {
     "distance": "separation, proximity, intersections, smallest distances, compared with plain detection",
     "step": "first contacts, collision-free step and trial steps, compared with all contacts",
     "motion": "a collision-free motion of each vertex, compared with one step size for all",
-    "inside": "winding numbers, signed distances, intersection curves, compared with peers; containment",
+    "inside": "winding numbers, signed distances, intersection curves, compared with peers; containment; penetration",
     "accuracy": "hard elementary and distance queries: false negatives and positives of each tier",
     "gpu": "the GPU backend: ms per frame with and without transfers, many worlds, stages",
     "rigid": "meshes moved by poses and joints: contacts compared with the truth, bounds, cost",

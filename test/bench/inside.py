@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Winding numbers, signed distances and intersection curves, compared with peers, and the cost of containment.
+"""Winding numbers, signed distances and intersection curves, compared with peers; containment; penetration.
 
   python -m bench inside --threads 1 --peers trueform,open3d,libigl     pip install trueform open3d libigl
   python -m bench inside --parts curves --peers trueform
   python -m bench inside --parts containment
+  python -m bench inside --parts penetration
 
 points: near the surface (1e-6 to 1e-2 of the size), in the box of the mesh, far (2 to 10 sizes), or hard: copies of
 single coordinates of vertices, and points that are a few roundings of single precision away from vertices, edges and
@@ -11,6 +12,9 @@ faces. still: the mesh of the call before, so a peer keeps its tree. deforming: 
 a tree is refitted or made. With one thread times are those of the process. wrong: signs that differ from the exact
 winding number; points on the surface do not count. off: the largest error of an absolute distance, divided by the size
 of the mesh.
+
+penetration: one mesh beside itself. first: without a start. warm: a moved by a thousandth of its size each time, with the
+translation before as the start. A translation is free if intersections and distances of the translated meshes say so.
 """
 
 from __future__ import annotations
@@ -26,8 +30,9 @@ import numpy as np
 import hpccd_core as hc
 from bench import lab, shapes
 from hpccd_ros.bench.sources import of_scene
+from hpccd_ros.scenes.shapes import torus
 
-PARTS = ("points", "curves", "containment")
+PARTS = ("points", "curves", "containment", "penetration")
 PEERS = ("trueform", "open3d", "libigl")
 KINDS = ("near", "box", "far", "hard")
 FRAMES = 4  # of a deforming mesh
@@ -61,6 +66,15 @@ COLUMNS = {
         "same without closed meshes": "open_ms",
         "ratio": "over_open",
     },
+    "penetration": {
+        "mesh": "mesh",
+        "triangles": "triangles",
+        "depth": "depth",
+        "lower bound": "lower_bound",
+        "upper / lower": "upper_over_lower",
+        "first, ms": "first_ms",
+        "warm, ms": "warm_ms",
+    },
 }
 
 
@@ -91,6 +105,7 @@ def run(args) -> lab.Report:
             "points": lambda: of_points(result, args, threads, peers, kinds),
             "curves": lambda: of_curves(result, args, threads, [peer for peer in peers if hasattr(peer, "curves")]),
             "containment": lambda: of_containment(result, args, threads),
+            "penetration": lambda: of_penetration(result, args, threads),
         }
         for part in parts:
             ask[part]()
@@ -424,3 +439,65 @@ def detector_of(meshes, threads):
     for mesh in meshes:
         scene.add_mesh(mesh.name, mesh.faces, n_vertices=mesh.n_vertices, static=mesh.static, self_collision=False)
     return hc.Detector(scene, threads=threads)
+
+
+# Penetration
+
+
+def of_penetration(result, args, threads):
+    for mesh, (a, b, faces) in penetrating(args.size).items():
+        scene = hc.Scene()
+        for name in "ab":
+            scene.add_mesh(name, faces, self_collision=False)
+        detector = hc.Detector(scene, backend="cpu", threads=threads)
+        move = 1e-3 * np.ptp(a, axis=0).max() * np.array([0.6, -0.48, 0.64])
+        first_ms, warm_ms, ratios, clock, start = [], [], [], clock_of(threads), None
+        for k in range(args.repeat + 1):
+            vertices = np.concatenate([a + k * move, b])
+            detector.intersections(vertices)  # a step of the scene: caches and threads are warm
+            for times, option in ((first_ms, None), (warm_ms, start)):
+                if times is warm_ms and start is None:
+                    continue
+                began = clock()
+                found = detector.penetration(vertices, "a", "b", start=option)
+                times.append(1e3 * (clock() - began))
+                ratios.append(found.depth / found.lower_bound if found.lower_bound else np.inf)
+                freed = np.concatenate([vertices[: len(a)] + found.translation, b])
+                if len(detector.intersections(freed)) or detector.distances(freed)[0].inside:
+                    result.failure(f"{mesh} {k}: not free after the translation")
+            start = found.translation
+        result.add(
+            part="penetration",
+            mesh=mesh,
+            triangles=2 * len(faces),
+            threads=threads,
+            depth=found.depth,
+            lower_bound=found.lower_bound,
+            upper_over_lower=float(np.median(ratios)),
+            worst_upper_over_lower=max(ratios),
+            first_ms=float(np.median(first_ms)),
+            warm_ms=float(np.median(warm_ms)),
+        )
+
+
+def penetrating(size: float):
+    """Two placements of one mesh each: a, b and their faces."""
+    ball, ball_faces = hc.shapes.icosphere(max(2, round(50 * size**0.5)))
+    egg = ball * (1, 0.7, 0.5)
+    ring, ring_faces = torus(*(max(6, round(n * size**0.5)) for n in (224, 112)))
+    bumpy, bumpy_faces = bumpy_sphere(size, 50_000)
+    step = of_scene("armadillo-like", size).first()
+    knobbly = step.meshes[0]
+    body = step.vertices_t0[: knobbly.n_vertices].astype(float)
+    body -= body.mean(axis=0)
+    return {
+        "spheres": (0.9 * ball + (1.2, 0.3, 0.2), ball, ball_faces),
+        "spheres, deep": (0.9 * ball + (0.2, 0.1, 0.05), ball, ball_faces),
+        "ellipsoids": (egg + (0.6, 0.2, 0.1), egg, ball_faces),
+        "tori": (ring + (0.5, 0.1, 0.05), ring, ring_faces),
+        "tori, crossing": (ring[:, [0, 2, 1]] * (1, -1, 1) + (0.3, 0.1, 0.2), ring, ring_faces),
+        "bumpy spheres": (bumpy + (1.6, 0.3, 0.2), bumpy, bumpy_faces),
+        "bumpy spheres, deep": (bumpy + (0.5, 0.2, 0.1), bumpy, bumpy_faces),
+        "armadillo-like": (body + 0.6 * np.ptp(body, axis=0) * (1, 0.2, 0), body, knobbly.faces),
+        "armadillo-like, deep": (body + 0.2 * np.ptp(body, axis=0) * (1, 0.2, 0.3), body, knobbly.faces),
+    }

@@ -109,6 +109,7 @@ def check_inside(rows):
     assert len(hard) == 4 and all(row["on_surface"] > 0 for row in hard)
     assert all(row["curves"] > 0 and row["length"] > 1 for row in by["curves"])
     assert [row["mesh"] for row in by["containment"]] == list(inside.STREAMS)
+    assert len(by["penetration"]) == 9 and all(0 < row["lower_bound"] <= row["depth"] for row in by["penetration"])
 
 
 def check_accuracy(rows):
