@@ -13,8 +13,8 @@ a tree is refitted or made. With one thread times are those of the process. wron
 winding number; points on the surface do not count. off: the largest error of an absolute distance, divided by the size
 of the mesh.
 
-penetration: one mesh beside itself. first: without a start. warm: a moved by a thousandth of its size each time, with the
-translation before as the start. A translation is free if intersections and distances of the translated meshes say so.
+penetration: one mesh beside itself. first: without a start. warm: a moved by a thousandth of its size each time, with
+the translation before as the start. A translation is free if intersections and distances of the moved meshes say so.
 """
 
 from __future__ import annotations
