@@ -189,6 +189,18 @@ def test_deterministic():
     assert results[0] == results[1] == results[2]
 
 
+def test_results_do_not_depend_on_earlier_queries():
+    """They would if they followed the detector's tree, which keeps its topology while the meshes move."""
+    rng, ball = np.random.default_rng(5), hc.shapes.icosphere(4)
+    used = detector_of(ball, ball)
+    for _ in range(40):
+        vertices = np.concatenate([rng.uniform(0.3, 2) * ball[0] + 0.5 * rng.normal(size=3), ball[0]])
+        for start in (None, (0.1, 0.2, 0.0)):
+            wanted = detector_of(ball, ball).penetration(vertices, "a", "b", start=start)
+            assert used.penetration(vertices, "a", "b", start=start) == wanted
+        used.distances(vertices)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_large_meshes_are_not_moved_farther_than_along_an_axis(seed):
     """Also where that ends in a gap, and with any number of threads; a start takes as short a way."""

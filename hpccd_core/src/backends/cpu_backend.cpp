@@ -305,11 +305,13 @@ std::optional<SignedDistances> CpuBackend::signed_distances(Positions vertices, 
 }
 
 MovedPair CpuBackend::moved_pair(Positions vertices, std::array<std::uint32_t, 2> meshes) {
-  fit_snapshot(vertices);
+  shared_.tree.bound(vertices);
+  shared_.profiler.mark("bounds");
+  counts_ = {};
   topologies_.resize(shared_.scene->meshes().size());
   for (const std::uint32_t mesh : meshes)
     if (!topologies_[mesh]) topologies_[mesh] = topology_of(*shared_.scene, mesh);
-  return {shared_.tree.tree(),     shared_.tree.motion(),   shared_.features, meshes,
+  return {shared_.tree.motion(),   shared_.features,        meshes,
           *topologies_[meshes[0]], *topologies_[meshes[1]], shared_.pool};
 }
 

@@ -2,6 +2,7 @@
 #include "solid/moved_pair.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <deque>
 #include <numeric>
@@ -13,6 +14,7 @@
 #include "elementary/exact/vector.h"
 #include "solid/closed.h"
 #include "solid/crossing.h"
+#include "solid/curve_order.h"
 
 namespace hpccd {
 namespace {
@@ -42,15 +44,14 @@ MeshTopology topology_of(const Scene& scene, std::uint32_t number) {
       lowest[std::max(v, w)] = std::min(v, w);
       seen[face[i] - mesh.first_vertex] = true;
     }
-  MeshTopology topology{is_closed(faces), {}};
+  MeshTopology topology{mesh.first_face, mesh.n_faces, is_closed(faces), {}};
   for (std::uint32_t v = 0; v < lowest.size(); ++v)
     if (seen[v] && lowest[v] == v) topology.representatives.push_back(mesh.first_vertex + v);
   return topology;
 }
 
-MovedPair::MovedPair(const Tree& tree, const MotionBounds& snapshot, const Features& features,
-                     std::array<std::uint32_t, 2> meshes, const MeshTopology& a, const MeshTopology& b,
-                     ThreadPool& pool)
+MovedPair::MovedPair(const MotionBounds& snapshot, const Features& features, std::array<std::uint32_t, 2> meshes,
+                     const MeshTopology& a, const MeshTopology& b, ThreadPool& pool)
     : snapshot_(snapshot), cancellation_(pool.cancellation()) {
   meshes_[0].topology = &a, meshes_[1].topology = &b;
   double largest = 0;
@@ -60,40 +61,45 @@ MovedPair::MovedPair(const Tree& tree, const MotionBounds& snapshot, const Featu
   }
   if (largest > 0) scale_ = std::ldexp(1.0, std::min(-1 - std::ilogb(largest), 1000));
   parallel_for_each(pool, 2, [&](std::size_t side) {
-    copy(meshes_[side], tree, features, meshes[side]);
+    build(meshes_[side], features, snapshot.extent_of_mesh(meshes[side]));
     fit(meshes_[side]);
   });
 }
 
-void MovedPair::copy(BoxedMesh& mesh, const Tree& tree, const Features& features, std::uint32_t number) const {
-  // Below mixed nodes: whole subtrees of the mesh.
-  std::vector<std::uint32_t> of_tree, above{0};
-  if (tree.nodes.empty()) return;
-  while (!above.empty()) {
-    const std::uint32_t n = above.back();
-    const Node& node = tree.nodes[n];
-    above.pop_back();
-    if (node.mesh == number)
-      of_tree.push_back(n);
-    else if (node.mesh == mixed_meshes && node.children)
-      above.push_back(node.children + 1), above.push_back(node.children);
+void MovedPair::build(BoxedMesh& mesh, const Features& features, const Extent& extent) const {
+  constexpr std::size_t leaf_size = 8;
+  const std::uint32_t first = mesh.topology->first_face, n = mesh.topology->n_faces;
+  if (n == 0) return;
+  const double up = 3 * scale_;
+  double size = 0;
+  for (int k = 0; k < 3; ++k) size = std::max(size, up * extent.high[k] - up * extent.low[k]);
+  const Curve curve({up * extent.low[0], up * extent.low[1], up * extent.low[2]}, size);
+  std::vector<OnCurve> order(n);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const auto& f = features.faces[first + i];
+    order[i] = {curve.code(position(f[0]) + position(f[1]) + position(f[2])), i};
   }
-  for (std::uint32_t i = 0; i < of_tree.size(); ++i) mesh.roots.push_back(i);
-  for (std::size_t i = 0; i < of_tree.size(); ++i) {
-    const Node& node = tree.nodes[of_tree[i]];
-    BoxedMesh::Node& own = mesh.nodes.emplace_back();
-    if (node.children) {
-      own.children = static_cast<std::uint32_t>(of_tree.size());
-      of_tree.push_back(node.children), of_tree.push_back(node.children + 1);
-      continue;
+  sort_by_code(order, cancellation_);
+  mesh.faces.reserve(n), mesh.face_numbers.reserve(n), mesh.nodes.reserve(n / 2 + 1);
+  for (const OnCurve& place : order) {
+    mesh.face_numbers.push_back(first + static_cast<std::uint32_t>(place.point));
+    mesh.faces.push_back(features.faces[mesh.face_numbers.back()]);
+  }
+  mesh.roots = {0};
+  mesh.nodes.push_back({{}, 0, 0, n});
+  for (std::uint32_t i = 0; i < mesh.nodes.size(); ++i) {
+    const auto [box, none, begin, end] = mesh.nodes[i];
+    if (end - begin <= leaf_size) continue;
+    // Between the halves of the smallest cell that contains all, or anywhere in the smallest of all.
+    std::uint32_t middle = begin + (end - begin) / 2;
+    const std::uint32_t low = order[begin].code, high = order[end - 1].code;
+    if (low != high) {
+      const std::uint32_t bit = std::bit_floor(low ^ high), half = high & ~(bit - 1);
+      const auto at = std::ranges::lower_bound(order.begin() + begin, order.begin() + end, half, {}, &OnCurve::code);
+      middle = static_cast<std::uint32_t>(at - order.begin());
     }
-    const LeafRange& leaf = tree.leaves[node.leaf];
-    own.first_face = static_cast<std::uint32_t>(mesh.faces.size());
-    for (std::uint32_t slot = leaf.first_face; slot < leaf.end_face; ++slot) {
-      mesh.face_numbers.push_back(tree.face_of_slot[slot]);
-      mesh.faces.push_back(features.faces[tree.face_of_slot[slot]]);
-    }
-    own.end_face = static_cast<std::uint32_t>(mesh.faces.size());
+    mesh.nodes[i] = {{}, static_cast<std::uint32_t>(mesh.nodes.size()), 0, 0};
+    mesh.nodes.push_back({{}, 0, begin, middle}), mesh.nodes.push_back({{}, 0, middle, end});
   }
 }
 

@@ -12,20 +12,22 @@
 #include "base/parallel.h"
 #include "base/vec3.h"
 #include "bvh/motion_bounds.h"
-#include "bvh/tree.h"
 #include "scene/features.h"
 
 namespace hpccd {
 
 // What does not depend on positions.
 struct MeshTopology {
+  std::uint32_t first_face, n_faces;  // in the scene
   bool closed;
   std::vector<std::uint32_t> representatives;  // a vertex of each part that faces connect
 };
 MeshTopology topology_of(const Scene& scene, std::uint32_t mesh);
 
-// The faces of one mesh, in boxes of double precision. Coordinates are multiplied by a power of two, so that the
-// largest of both meshes is between 1/2 and 1. (Losses by underflow are far below the error bounds.)
+// The faces of one mesh, in a tree of boxes of double precision. It depends on positions alone, so that results do not
+// depend on the queries before, as they would by the refitted tree of the detector. Coordinates are multiplied by a
+// power of two, so that the largest of both meshes is between 1/2 and 1. (Losses by underflow are far below the error
+// bounds.)
 struct BoxedMesh {
   struct Box {
     Vec3<double> low, high;
@@ -35,8 +37,8 @@ struct BoxedMesh {
     std::uint32_t children = 0;  // the left child; the right one follows it. 0: a leaf
     std::uint32_t first_face = 0, end_face = 0;
   };
-  std::vector<Node> nodes;  // children come after their parents
-  std::vector<std::uint32_t> roots;
+  std::vector<Node> nodes;                          // children come after their parents
+  std::vector<std::uint32_t> roots;                 // one, or none without faces
   std::vector<std::array<std::uint32_t, 3>> faces;  // vertices, in the order of the leaves
   std::vector<std::uint32_t> face_numbers;          // in the scene
   const MeshTopology* topology = nullptr;
@@ -60,8 +62,8 @@ struct ContactInterval {
 class MovedPair {
  public:
   // The arguments must outlive the object.
-  MovedPair(const Tree& tree, const MotionBounds& snapshot, const Features& features,
-            std::array<std::uint32_t, 2> meshes, const MeshTopology& a, const MeshTopology& b, ThreadPool& pool);
+  MovedPair(const MotionBounds& snapshot, const Features& features, std::array<std::uint32_t, 2> meshes,
+            const MeshTopology& a, const MeshTopology& b, ThreadPool& pool);
 
   const BoxedMesh& a() const { return meshes_[0]; }
   const BoxedMesh& b() const { return meshes_[1]; }
@@ -79,7 +81,7 @@ class MovedPair {
   void heed() const { cancellation_.heed(); }
 
  private:
-  void copy(BoxedMesh& mesh, const Tree& tree, const Features& features, std::uint32_t number) const;
+  void build(BoxedMesh& mesh, const Features& features, const Extent& extent) const;
   void fit(BoxedMesh& mesh) const;
 
   const MotionBounds& snapshot_;

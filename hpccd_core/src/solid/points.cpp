@@ -4,14 +4,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <limits>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "base/coordinate_limits.h"
 #include "bvh/bad_coordinate.h"
 #include "elementary/exact/intersection.h"
+#include "solid/curve_order.h"
 #include "solid/nearest_face.h"
 #include "solid/winding.h"
 
@@ -35,51 +34,17 @@ void read(const Real* x, std::size_t n, ThreadPool& pool, std::vector<Vec3<doubl
   if (!good) report_bad("points", x, n, largest_in_snapshot);
 }
 
-// Every third bit of the result is one of the lowest ten of x.
-std::uint32_t spread_bits(std::uint32_t x) {
-  x = (x | x << 16) & 0x030000ff;
-  x = (x | x << 8) & 0x0300f00f;
-  x = (x | x << 4) & 0x030c30c3;
-  return (x | x << 2) & 0x09249249;
-}
-
-// The points in Morton order within the box of the mesh, three times as large. Stable, so it depends on nothing else.
-std::vector<std::size_t> curve_order(const MeshInTree& mesh, const std::vector<Vec3<double>>& points,
-                                     ThreadPool& pool) {
-  constexpr std::uint32_t cells = 1024;
+// Within the box of the mesh, three times as large.
+std::vector<OnCurve> order_near(const MeshInTree& mesh, const std::vector<Vec3<double>>& points, ThreadPool& pool) {
   const Extent& extent = mesh.snapshot.extent_of_mesh(mesh.mesh);
-  double size = 0, low[3];
+  double size = 0;
   for (int k = 0; k < 3; ++k) size = std::max(size, extent.high[k] - extent.low[k]);
-  for (int k = 0; k < 3; ++k) low[k] = extent.low[k] - size;
-  double per_cell = cells / 3.0 / size;
-  if (!(per_cell < std::numeric_limits<double>::infinity())) per_cell = 0;
-  struct Key {
-    std::uint32_t code;
-    std::size_t point;
-  };
-  std::vector<Key> keys(points.size());
+  const Curve curve({extent.low[0] - size, extent.low[1] - size, extent.low[2] - size}, 3 * size);
+  std::vector<OnCurve> order(points.size());
   parallel_for(pool, points.size(), 4096, [&](std::size_t begin, std::size_t end, int) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const double at[3] = {points[i].x, points[i].y, points[i].z};
-      std::uint32_t code = 0;
-      for (int k = 0; k < 3; ++k)
-        code |= spread_bits(static_cast<std::uint32_t>(std::clamp((at[k] - low[k]) * per_cell, 0.0, cells - 1.0))) << k;
-      keys[i] = {code, i};
-    }
+    for (std::size_t i = begin; i < end; ++i) order[i] = {curve.code(points[i]), i};
   });
-  std::vector<Key> sorted(points.size());
-  constexpr int digit = 10;
-  for (int shift = 0; shift < 30; shift += digit) {
-    pool.cancellation().heed();
-    std::vector<std::size_t> begin(std::size_t{1} << digit, 0);
-    for (const Key& k : keys) ++begin[k.code >> shift & (cells - 1)];
-    std::size_t sum = 0;
-    for (std::size_t& b : begin) sum += std::exchange(b, sum);
-    for (const Key& k : keys) sorted[begin[k.code >> shift & (cells - 1)]++] = k;
-    keys.swap(sorted);
-  }
-  std::vector<std::size_t> order(points.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = keys[i].point;
+  sort_by_code(order, pool.cancellation());
   return order;
 }
 
@@ -135,10 +100,10 @@ class Piece {
  public:
   Piece(const MeshInTree& mesh, NearestFaceSearch& search) : mesh_(mesh), search_(search) {}
 
-  void find(const std::vector<Vec3<double>>& points, std::span<const std::size_t> which, SignedDistances& result) {
+  void find(const std::vector<Vec3<double>>& points, std::span<const OnCurve> which, SignedDistances& result) {
     starts_.clear(), start_of_.clear(), nearest_.clear();
     FreeBall last{};
-    for (const std::size_t i : which) {
+    for (const auto& [code, i] : which) {
       nearest_.push_back(search_.find(points[i], nearest_.empty() ? Tree::none : nearest_.back().face));
       const NearestFace& found = nearest_.back();
       const FreeBall here{points[i], found.distance * (1 - 1e-15) - found.error};
@@ -150,7 +115,7 @@ class Piece {
     windings_.resize(starts_.size());
     find_windings(mesh_, starts_, windings_);
     for (std::size_t j = 0; j < which.size(); ++j) {
-      const std::size_t i = which[j];
+      const std::size_t i = which[j].point;
       const Winding& winding = windings_[start_of_[j]];
       NearestFace& found = nearest_[j];
       if (winding.on_surface) found = {0, face_at(mesh_, points[i]), points[i]};
@@ -183,25 +148,38 @@ std::vector<Vec3<double>> checked_points(Positions points, ThreadPool& pool) {
 
 WindingNumbers winding_numbers(const MeshInTree& mesh, Positions given, ThreadPool& pool) {
   const std::vector<Vec3<double>> points = checked_points(given, pool);
-  const std::vector<std::size_t> order = curve_order(mesh, points, pool);
+  // Beyond the box of the mesh they are 0.
+  const Extent& extent = mesh.snapshot.extent_of_mesh(mesh.mesh);
+  std::vector<Vec3<double>> in_box;
+  std::vector<std::size_t> number;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vec3<double>& p = points[i];
+    if (p.x < extent.low[0] || p.x > extent.high[0] || p.y < extent.low[1] || p.y > extent.high[1] ||
+        p.z < extent.low[2] || p.z > extent.high[2])
+      continue;
+    in_box.push_back(p), number.push_back(i);
+  }
+  const std::vector<OnCurve> order = order_near(mesh, in_box, pool);
   WindingNumbers found;
   resize(found.numbers, points.size(), pool.cancellation());
   resize(found.on_surface, points.size(), pool.cancellation());
-  parallel_for(pool, points.size(), points_per_piece, [&](std::size_t begin, std::size_t end, int) {
+  parallel_for(pool, order.size(), points_per_piece, [&](std::size_t begin, std::size_t end, int) {
     Vec3<double> near[points_per_piece];
     Winding windings[points_per_piece];
     const std::span which = std::span(order).subspan(begin, end - begin);
-    for (std::size_t j = 0; j < which.size(); ++j) near[j] = points[which[j]];
+    for (std::size_t j = 0; j < which.size(); ++j) near[j] = in_box[which[j].point];
     find_windings(mesh, std::span(near).first(which.size()), windings);
-    for (std::size_t j = 0; j < which.size(); ++j)
-      found.numbers[which[j]] = windings[j].number, found.on_surface[which[j]] = windings[j].on_surface;
+    for (std::size_t j = 0; j < which.size(); ++j) {
+      const std::size_t i = number[which[j].point];
+      found.numbers[i] = windings[j].number, found.on_surface[i] = windings[j].on_surface;
+    }
   });
   return found;
 }
 
 SignedDistances signed_distances(const MeshInTree& mesh, Positions given, ThreadPool& pool) {
   const std::vector<Vec3<double>> points = checked_points(given, pool);
-  const std::vector<std::size_t> order = curve_order(mesh, points, pool);
+  const std::vector<OnCurve> order = order_near(mesh, points, pool);
   SignedDistances result;
   resize(result.distance, points.size(), pool.cancellation());
   resize(result.faces, points.size(), pool.cancellation());
