@@ -190,9 +190,9 @@ class SolidQueries(SnapshotCalls):
 
         Notes
         -----
-        Directions are searched by branch and bound over the support of the convex hulls. From the best ones, and from
-        others all around, local searches follow the contacts (Je et al., "PolyDepth", ACM Transactions on Graphics,
-        2012). The result depends on the arguments only. The rules of the scene do not apply.
+        Local searches follow the contacts (Je et al., "PolyDepth", ACM Transactions on Graphics, 2012) from normals of
+        hulls, intersection curves and deepest vertex, and principal axes. Without `start`, mostly no longer than along
+        an axis (always below 2,000 faces). Depends on the arguments only. The rules of the scene do not apply.
 
         Examples
         --------

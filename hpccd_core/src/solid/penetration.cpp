@@ -329,10 +329,10 @@ Penetration result_of(const MovedPair& pair, const V& translation, const Contact
 
 // The places of several directions, in their order: those that are not much longer than the best one, or than a limit.
 // The limit falls from batch to batch, which are as long for any number of threads.
-std::vector<Place> exits(const Search& search, std::span<const V> directions, double limit, ThreadPool& pool) {
+std::vector<Place> exits(const Search& search, std::span<const V> directions, double limit, double much,
+                         ThreadPool& pool) {
   constexpr std::size_t batch = 16;
-  // How much longer a place may be and lead to a shorter one.
-  const auto reach = [&] { return 1.2 * limit + 1e-12; };
+  const auto reach = [&] { return much * limit + 1e-12; };
   std::vector<Place> all(directions.size());
   for (std::size_t first = 0; first < directions.size(); first += batch) {
     const std::size_t n = std::min(batch, directions.size() - first);
@@ -389,17 +389,28 @@ std::vector<Place> starts_of(std::vector<Place> places, std::size_t most) {
   return starts;
 }
 
-// Directions all around, and a few that are good for the hulls, to a thousandth; finer where that costs little.
-std::vector<V> directions_of_hulls(const HullOfPlaces& hull, bool small, double& nearest) {
+// How far a search goes. For large meshes directions cost more and, with 60 pairs of tori and bumpy spheres of 2,000 to
+// 7,000 faces, these numbers find translations that are 0.05 % longer on average, in 60 % of the time.
+struct Effort {
+  std::size_t n_around, n_of_hulls;  // directions
+  double hull_tolerance;
+  std::size_t n_hull_directions;
+  double reach;  // how much longer a place may be and lead to a shorter one
+  std::size_t n_starts, n_slides;
+};
+constexpr Effort small_effort{66, 16, 1e-6, 6000, 1.2, 6, 3}, large_effort{34, 6, 1e-3, 200, 1.1, 4, 2};
+
+// Directions all around, and a few that are good for the hulls.
+std::vector<V> directions_of_hulls(const HullOfPlaces& hull, const Effort& effort, double& nearest) {
   Directions directions(hull);
-  directions.refine(0, 66);
+  directions.refine(0, effort.n_around);
   const std::size_t n_spread = directions.corners().size();
-  directions.refine(small ? 1e-6 : 1e-3, small ? 6000 : 200);
+  directions.refine(effort.hull_tolerance, effort.n_hull_directions);
   nearest = directions.best();
   std::vector<Directions::Corner> order = directions.corners();
   const auto nearer = [](const auto& x, const auto& y) { return x.distance < y.distance; };
   std::stable_sort(order.begin() + static_cast<std::ptrdiff_t>(n_spread), order.end(), nearer);
-  order.resize(std::min(n_spread + 16, order.size()));
+  order.resize(std::min(n_spread + effort.n_of_hulls, order.size()));
   std::ranges::stable_sort(order, nearer);
   std::vector<V> result;
   for (const auto& corner : order) result.push_back(corner.direction);
@@ -412,6 +423,7 @@ Penetration penetration(const MovedPair& pair, const std::optional<V>& start, Th
   if (is_free(pair, {0, 0, 0})) return {};
   const Search search(pair);
   const bool small = pair.a().faces.size() + pair.b().faces.size() < 2000;
+  const Effort& effort = small ? small_effort : large_effort;
   if (small) pair.bits();  // before threads share it
   DeepestVertex deepest;
   std::vector<Place> places;
@@ -447,7 +459,7 @@ Penetration penetration(const MovedPair& pair, const std::optional<V>& start, Th
     double limit = INFINITY;
     parallel_for_each(pool, 3, [&](std::size_t task) {
       if (task == 0) deepest = deepest_vertex(pair);
-      if (task == 1) directions = directions_of_hulls(HullOfPlaces(pair), small, limit);
+      if (task == 1) directions = directions_of_hulls(HullOfPlaces(pair), effort, limit);
       if (task == 2) normals = normals_of_contours(pair, 4);
     });
     for (const BoxedMesh* mesh : {&pair.a(), &pair.b()})
@@ -457,13 +469,13 @@ Penetration penetration(const MovedPair& pair, const std::optional<V>& start, Th
         for (const double sign : {1.0, -1.0}) directions.push_back(unit((sign / most) * n));
     if (const double most = max_norm(deepest.way_out); most > 0)
       directions.push_back(unit((1 / most) * deepest.way_out));
-    places = exits(search, directions, limit, pool);
-    const std::vector<Place> from = starts_of(places, 6);
+    places = exits(search, directions, limit, effort.reach, pool);
+    const std::vector<Place> from = starts_of(places, effort.n_starts);
     for (const Place& place : places) limit = std::min(limit, place.depth);
     std::vector<Place> found(from.size() + 6);
     parallel_for_each(pool, found.size(), [&](std::size_t i) {
       if (i < from.size()) {
-        found[i] = local_search(from[i], i < 3);
+        found[i] = local_search(from[i], i < effort.n_slides);
         return;
       }
       const std::size_t axis = i - from.size();
