@@ -182,6 +182,16 @@ def test_scales_and_float32(scale):
     assert is_free(*single, penetration(*single).translation)
 
 
+def test_meshes_that_only_touch_are_separated_by_almost_nothing():
+    """A tetrahedron stands on an open box that is inside a larger box of the same mesh."""
+    box, faces = hc.shapes.box()
+    feet = np.array([[0.5, 0.25, 1.0], [0.75, 0.25, 1.0], [0.5, 0.5, 1.0], [0.5, 0.25, 1.25]])
+    outer = np.concatenate([4 * box + [0.5, 1, 0], 4 * box + [0.5, 0.25, -1]])
+    open_mesh = np.concatenate([faces[1:], faces + len(box)])
+    p = penetration((feet, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]), (outer, open_mesh))
+    assert 0 < p.depth < 1e-14 and p.translation[2] > 0
+
+
 def test_deterministic():
     a, b = bumpy(6, np.random.default_rng(1)), torus(20, 10)
     vertices = np.concatenate([a[0], b[0]])

@@ -191,6 +191,12 @@ std::optional<V> certified(const MovedPair& pair, const Place& place) {
   return std::nullopt;
 }
 
+// After a time along a direction. Meshes that only touch are free after the least translation.
+Place place_of(const ContactTime& time, const V& direction) {
+  const double depth = std::max(time.at, 1e-15);
+  return {depth * direction, depth, time};
+}
+
 class Search {
  public:
   explicit Search(const MovedPair& pair) : pair_(pair) {}
@@ -200,15 +206,12 @@ class Search {
     const auto end = Translation(pair_, direction, {0, 0, 0}, Decided::roughly).latest_end(nullptr, limit);
     if (!end) return {};
     if (end->at > limit) return {{}, INFINITY, *end};
-    const double depth = std::max(end->at, 1e-15);  // meshes that touch
-    return {depth * direction, depth, *end};
+    return place_of(*end, direction);
   }
 
   // The first place along a direction that is free: before the last contact, one within a ring or an open box.
   Place first_gap(const V& direction) const {
-    const ContactTime time = first_separation(Translation(pair_, direction));
-    if (!(time.at > 0)) return {};
-    return {time.at * direction, time.at, time};
+    return place_of(first_separation(Translation(pair_, direction)), direction);
   }
 
   // The same within rounding errors, if that is nearer than a limit, and found in few steps. contact: one that is late
@@ -242,7 +245,7 @@ class Search {
         time = *end;
         continue;
       }
-      if (const Place place{time.at * direction, time.at, time}; certified(pair_, place)) return place;
+      if (const Place place = place_of(time, direction); certified(pair_, place)) return place;
       const auto begin = translation.earliest_begin(time, limit);
       if (!begin) break;
       time = *begin;
@@ -280,6 +283,7 @@ class Search {
       const V direction = (1 / far) * way;
       const auto hit = Translation(pair_, direction, p, Decided::roughly).earliest_begin({}, far);
       if (!hit || hit->at >= far) {
+        if (!(length(*target) > 0)) break;  // by rounding: the meshes are not free there
         p = *target;
         if (length(p) < best.depth) best.at = p, best.depth = length(p);
         if (spaces.empty()) break;
