@@ -26,8 +26,7 @@ bool within(const double* x, const Extent& e) {
   return true;
 }
 
-// A list costs about as much as deciding its vertices, and following it reads all vertices of the mesh: 1,000 of them
-// in the time of one decision.
+// Following the list reads all vertices of the mesh: 1,000 of them in the time of one decision.
 bool list_would_pay(std::size_t vertices, std::size_t of_mesh) { return vertices >= 16 && 1000 * vertices >= of_mesh; }
 
 }  // namespace
@@ -38,9 +37,8 @@ struct Containment::Question {
   Inside answer;
   std::size_t key;
   std::uint32_t inner, outer;
-  std::vector<std::uint32_t> candidates = {};  // vertices of components that may be inside, in ascending order
-  std::uint32_t first = none;                  // the candidate that is decided first
-  std::vector<std::uint32_t> open = {};        // others that the memory does not decide
+  std::vector<std::uint32_t> candidates = {};  // components that may be inside, in ascending order
+  std::vector<std::uint32_t> open = {};        // those that the memory does not decide
   std::atomic<std::uint32_t> found = none;     // one that is inside
 };
 
@@ -79,8 +77,8 @@ std::deque<Containment::Question> Containment::questions_of(std::span<Gap> gaps,
       const std::span<const std::uint32_t> vertices = components(inner);
       if (vertices.size() == 1 ? !(within(part.low, whole) && within(part.high, whole)) : !overlap(part, whole)) return;
       Question& q = questions.emplace_back(gap, answer, 2 * i + (answer == Inside::b), inner, outer);
-      for (const std::uint32_t v : vertices)
-        if (within(snapshot.vertices[v].t0, whole)) q.candidates.push_back(v);
+      for (std::uint32_t c = 0; c < vertices.size(); ++c)
+        if (within(snapshot.vertices[vertices[c]].t0, whole)) q.candidates.push_back(c);
       if (q.candidates.empty()) questions.pop_back();
     };
     ask(Inside::a, gap.mesh_a, gap.mesh_b), ask(Inside::b, gap.mesh_b, gap.mesh_a);
@@ -92,74 +90,62 @@ void Containment::decide(std::span<Gap> gaps, const Tree& tree, const MotionBoun
                          ThreadPool& pool) const {
   std::deque<Question> questions = questions_of(gaps, snapshot);
   if (questions.empty()) return;
-  // At most points_at_once vertices.
-  const auto test = [&](Question& q, std::span<const std::uint32_t> vertices) {
+  // At most points_at_once components.
+  const auto test = [&](Question& q, std::span<const std::uint32_t> which, OutsideList* outside) {
     if (q.found.load(std::memory_order_relaxed) != none) return;
+    const std::span<const std::uint32_t> vertices = components(q.inner);
     std::array<Vec3<double>, points_at_once> points;
     std::array<Winding, points_at_once> windings;
-    for (std::size_t i = 0; i < vertices.size(); ++i) {
-      const double* x = snapshot.vertices[vertices[i]].t0;
+    for (std::size_t i = 0; i < which.size(); ++i) {
+      const double* x = snapshot.vertices[vertices[which[i]]].t0;
       points[i] = {x[0], x[1], x[2]};
     }
-    winding_numbers(tree, snapshot, features_, q.outer, std::span(points).first(vertices.size()),
-                    std::span(windings).first(vertices.size()));
-    for (std::size_t i = 0; i < vertices.size(); ++i)
-      if (windings[i].number != 0) q.found.store(vertices[i], std::memory_order_relaxed);
+    winding_numbers(tree, snapshot, features_, q.outer, std::span(points).first(which.size()),
+                    std::span(windings).first(which.size()));
+    for (std::size_t i = 0; i < which.size(); ++i) {
+      if (windings[i].number != 0)
+        q.found.store(which[i], std::memory_order_relaxed);
+      else if (outside)
+        outside->measure(tree, snapshot, features_, q.outer, which[i], vertices[which[i]]);
+    }
   };
 
-  for (Question& q : questions) {
-    q.first = q.candidates.front();
-    if (q.candidates.size() == 1) continue;
-    const std::uint32_t last = memory.of_pair[q.key].found;
-    if (std::ranges::binary_search(q.candidates, last)) q.first = last;
-  }
+  // First, of each pair, the one that was inside last.
   constexpr std::size_t grain = 4;  // about 20 us, less than it takes to wake a thread
   parallel_for(pool, questions.size(), grain, [&](std::size_t begin, std::size_t end, int) {
-    for (std::size_t i = begin; i < end; ++i) test(questions[i], {&questions[i].first, 1});
+    for (std::size_t i = begin; i < end; ++i) {
+      Question& q = questions[i];
+      if (q.candidates.size() == 1) test(q, q.candidates, nullptr);
+      const auto memory_of_pair = memory.of_pair.find(q.key);
+      if (q.candidates.size() == 1 || memory_of_pair == memory.of_pair.end()) continue;
+      const std::uint32_t last = memory_of_pair->second.found;
+      if (std::ranges::binary_search(q.candidates, last)) test(q, {&last, 1}, nullptr);
+    }
   });
 
   for (Question& q : questions) {
-    if (q.candidates.size() == 1 || q.found != none) continue;
-    OutsideList* outside = memory.of_pair[q.key].outside.get();
-    if (outside) outside->follow(snapshot, pool);
-    for (const std::uint32_t v : q.candidates) {
-      if (v == q.first) continue;
-      const bool known = outside && outside->still_outside(snapshot, v);
-      if (outside) ++(known ? outside->decided : outside->open);
-      if (!known) q.open.push_back(v);
+    if (q.candidates.size() > 1) {
+      ContainmentMemory::OfPair& of_pair = memory.of_pair[q.key];
+      if (q.found == none) {
+        const Scene::Mesh& outer = scene_.meshes()[q.outer];
+        if (of_pair.outside) {
+          of_pair.outside->follow(snapshot, pool);
+        } else if (list_would_pay(q.candidates.size(), outer.n_vertices)) {
+          const VertexRange range{outer.first_vertex, std::size_t{outer.first_vertex} + outer.n_vertices};
+          of_pair.outside = std::make_unique<OutsideList>(snapshot, range, components(q.inner).size(), pool);
+        }
+        OutsideList* outside = of_pair.outside.get();
+        for (const std::uint32_t c : q.candidates)
+          if (!outside || !outside->still_outside(snapshot, c, components(q.inner)[c])) q.open.push_back(c);
+        parallel_for(pool, q.open.size(), points_at_once, [&](std::size_t begin, std::size_t end, int) {
+          test(q, std::span<const std::uint32_t>(q.open).subspan(begin, end - begin), outside);
+        });
+      }
+      if (q.found != none) of_pair.outside.reset();  // it does not follow while this one is inside
+      of_pair.found = q.found;
     }
-    parallel_for(pool, q.open.size(), points_at_once, [&](std::size_t begin, std::size_t end, int) {
-      test(q, std::span<const std::uint32_t>(q.open).subspan(begin, end - begin));
-    });
-  }
-
-  for (Question& q : questions) {
     if (q.found != none) q.gap.inside = q.gap.inside == Inside::none ? q.answer : Inside::both;
-    if (q.candidates.size() > 1) remember(q, tree, snapshot, memory.of_pair[q.key], pool);
   }
-}
-
-// Makes a list when all candidates are outside, and another one when the last has left as many open as it has.
-void Containment::remember(const Question& q, const Tree& tree, const MotionBounds& snapshot,
-                           ContainmentMemory::OfPair& memory, ThreadPool& pool) const {
-  constexpr int pause = 16;  // snapshots without a list, after one that has not paid
-  if (q.found != none) {
-    memory.found = q.found;
-    return;
-  }
-  if (memory.outside) {
-    if (memory.outside->open < memory.outside->size()) return;
-    memory.rests = memory.outside->decided < 2 * memory.outside->size() ? pause : 0;
-    memory.outside.reset();
-  }
-  if (memory.rests > 0) {
-    --memory.rests;
-    return;
-  }
-  const Scene::Mesh& outer = scene_.meshes()[q.outer];
-  if (!list_would_pay(q.candidates.size(), outer.n_vertices)) return;
-  const VertexRange range{outer.first_vertex, std::size_t{outer.first_vertex} + outer.n_vertices};
-  memory.outside = std::make_unique<OutsideList>(tree, snapshot, q.outer, range, q.candidates, pool);
 }
 
 }  // namespace hpccd

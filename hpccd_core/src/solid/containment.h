@@ -23,8 +23,7 @@ namespace hpccd {
 struct ContainmentMemory {
   struct OfPair {
     std::uint32_t found = Tree::none;      // the vertex that was inside last
-    std::unique_ptr<OutsideList> outside;  // made when many vertices were outside
-    int rests = 0;                         // snapshots until another list may be made
+    std::unique_ptr<OutsideList> outside;  // of the components, where many are near the other mesh, and all outside
   };
   // By twice the number of the pair of meshes, plus 1 if the second one may be inside.
   std::unordered_map<std::size_t, OfPair> of_pair;
@@ -50,8 +49,6 @@ class Containment {
     return {vertices_.data() + first_[mesh], vertices_.data() + first_[mesh + 1]};
   }
   std::deque<Question> questions_of(std::span<Gap> gaps, const MotionBounds& snapshot) const;
-  void remember(const Question& question, const Tree& tree, const MotionBounds& snapshot,
-                ContainmentMemory::OfPair& memory, ThreadPool& pool) const;
 
   const Scene& scene_;
   const Features& features_;
