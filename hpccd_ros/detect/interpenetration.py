@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import hpccd_core as hc
+from hpccd_ros.detect.closed_meshes import ClosedMeshes
 from hpccd_ros.detect.core import Cancellation
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.types import Topology
@@ -48,6 +49,7 @@ class InterpenetrationDetector:
         named = [(self._numbers[a], self._numbers[b]) for a, b in self._builder.pairs]
         self._pairs = np.array(named, np.int64).reshape(-1, 2)  # the lower number first
         self._topologies: tuple[Topology, ...] = ()
+        self._closed_meshes = ClosedMeshes()
         self._closed: np.ndarray | None = None
         self._surfaces: hc.Detector | None = None  # within meshes, too
         self._solids: hc.Detector | None = None  # made for the first depth
@@ -90,7 +92,7 @@ class InterpenetrationDetector:
     def _may_contain(self, vertices: Sequence[np.ndarray], meeting: set[tuple[int, ...]]) -> bool:
         """Whether the boxes of two meshes overlap of which one is closed, and which do not intersect."""
         if self._closed is None:
-            self._closed = np.array([len(t.faces) > 0 and hc.closed(t.faces) for t in self._topologies])
+            self._closed = np.array(self._closed_meshes.of(self._topologies))
         low, high = np.full((2, len(vertices), 3), np.nan)  # of no vertices: overlaps nothing
         for number, of_mesh in enumerate(vertices):
             if len(of_mesh):

@@ -7,6 +7,7 @@ import hpccd_core as hc
 from hpccd_core.options import FEATURES
 from hpccd_ros.detect import approach
 from hpccd_ros.detect.approach import Slowdown
+from hpccd_ros.detect.closed_meshes import ClosedMeshes
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.separation import Separation
@@ -26,6 +27,7 @@ class Nearness:
         self._names = [mesh.name for mesh in builder.meshes]
         self._tested = {name for pair in builder.pairs for name in pair}
         self._static = [number for number, mesh in enumerate(builder.meshes) if mesh.static]
+        self._closed = ClosedMeshes()
         self._apart: SceneFrame | None = None  # no edge intersects a face there
         self._outside: SceneFrame | None = None  # no mesh lies inside another there
         self._last_gaps: tuple[SceneFrame, list[hc.Gap]] | None = None
@@ -58,7 +60,7 @@ class Nearness:
         # A mesh that gets inside meets the other's surface on its way, so only starts are tested.
         outside, self._outside = self._stays(start, end) and self._outside is start, None
         if not outside:
-            for gap in self._detector.distances(end):
+            for gap in self._gaps(end):
                 if gap.inside:
                     return (gap.mesh_b, gap.mesh_a) if gap.inside == "b" else (gap.mesh_a, gap.mesh_b)
         self._outside = end
@@ -66,11 +68,9 @@ class Nearness:
 
     def not_closed(self, frame: SceneFrame) -> list[str]:
         """Names of the meshes with faces that are not closed: what lies inside them is unknown."""
-        return [
-            name
-            for name, topology in zip(self._names, frame.topologies, strict=True)
-            if name in self._tested and len(topology.faces) and not hc.closed(topology.faces)
-        ]
+        named = zip(self._names, frame.topologies, strict=True)
+        tested = {name: topology for name, topology in named if name in self._tested and len(topology.faces)}
+        return [name for name, closed in zip(tested, self._closed.of(tested.values()), strict=True) if not closed]
 
     def _stays(self, start: SceneFrame, end: SceneFrame) -> bool:
         """Whether no static mesh was placed elsewhere, without a motion."""
@@ -79,12 +79,18 @@ class Nearness:
     def slowdown(self, start: SceneFrame, end: SceneFrame, distance: float, time: float) -> Slowdown:
         """How far to slow down after a step that came nowhere within ``distance``. time: s in which meshes may come
         that near at full speed. Raises the core's errors."""
-        last, gaps = self._last_gaps, self._detector.distances(end)
-        self._last_gaps = end, gaps
+        last = self._last_gaps
         before = last[1] if last is not None and last[0] is start else self._detector.distances(start)
+        gaps = self._gaps(end)
         moved = self._detector.approached(start, end, gaps)
         speeds = approach.closing_speeds(before, gaps, moved, 1e-9 * (end.stamp - start.stamp))
         return approach.slowdown(gaps, speeds, distance, time)
+
+    def _gaps(self, frame: SceneFrame) -> list[hc.Gap]:
+        """Computed once for the same frame."""
+        if self._last_gaps is None or self._last_gaps[0] is not frame:
+            self._last_gaps = frame, self._detector.distances(frame)
+        return self._last_gaps[1]
 
     def _meshes(self, pairs: hc.Contacts | hc.Intersections) -> tuple[str, str] | None:
         """The names of the meshes of the first pair."""
