@@ -53,11 +53,11 @@ def speared_torso():
 
 
 SCENES = {"cloth": folded_cloth, "sleeve": sleeve_in_torso, "speared": speared_torso}
-VIEWS = {"cloth": (-60.0, 35.0), "sleeve": (20.0, 15.0), "speared": (-60.0, 15.0)}  # of pictures, degrees
+VIEWS = {"cloth": (-60.0, 35.0), "sleeve": (70.0, 15.0), "speared": (-60.0, 15.0)}  # of pictures, degrees
 
 
 def displacements(hits, n_vertices, free, most):
-    """(V, 3): of the points of the curves, along their directions by at most so much, shared among the vertices."""
+    """(V, 3): moves points of the curves along their directions, each by at most `most`, through its five vertices."""
     length = np.linalg.norm(hits.directions, axis=1, keepdims=True)
     step = most * hits.directions / np.maximum(1.0, length)
     vertices = np.concatenate([hits.ef[:, :2], hits.faces[hits.ef[:, 2]]], axis=1)
@@ -149,12 +149,15 @@ def save_picture(path, name, meshes, x, first, last):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenes", nargs="*", default=["cloth", "sleeve"], help=f"of {', '.join(SCENES)}")
+    names = ", ".join(SCENES)
+    parser.add_argument(
+        "scenes", nargs="*", default=["cloth", "sleeve"], help=f"some of {names} (default: cloth sleeve)"
+    )
     parser.add_argument("--iterations", type=int, default=500, help="limit of iterations (default: %(default)s)")
     parser.add_argument("--picture", action="store_true", help="write SCENE.png, before and after (needs hpccd)")
     options = parser.parse_args()
     if unknown := set(options.scenes) - set(SCENES):
-        parser.error(f"scenes: {', '.join(sorted(unknown))}: not known; use {', '.join(SCENES)}")
+        parser.error(f"scenes: {', '.join(sorted(unknown))}: not known; use {names}")
     still_tangled = []
     for name in options.scenes:
         meshes = SCENES[name]()

@@ -89,7 +89,7 @@ class SolidQueries(SnapshotCalls):
         Raises
         ------
         TypeError, ValueError
-            As :meth:`winding_numbers`.
+            As for :meth:`winding_numbers`.
 
         Examples
         --------
@@ -123,7 +123,7 @@ class SolidQueries(SnapshotCalls):
         -------
         float
             The infimum of the s >= 0 for which a, moved by s along `direction`, is free of b, in the unit of
-            the coordinates: within 1e-12 of its own size, above or below. At s they may touch.
+            the coordinates: within 1e-12 of its own size, above or below. At s they touch; beyond, they may meet again.
 
         Raises
         ------
@@ -133,9 +133,7 @@ class SolidQueries(SnapshotCalls):
         Notes
         -----
         Free: no face of one has a point in common with a face of the other, and no part of a mesh is inside the other
-        one where that is closed. Decided as by rational arithmetic, on the CPU. The rules of the scene (ignored pairs,
-        separations, tested features) do not apply: the query names its meshes. Beyond s the meshes may meet again.
-        The cost grows with the number of faces that the contact passes on the way.
+        one where that is closed. Decided as by rational arithmetic, on the CPU. The rules of the scene do not apply.
 
         Examples
         --------
@@ -174,7 +172,8 @@ class SolidQueries(SnapshotCalls):
         mesh_a, mesh_b : str or int
             Names or numbers of two different meshes with faces.
         start : ArrayLike, shape (3,), optional
-            A translation near which to search, such as that of the previous frame, instead of in all directions.
+            A translation near which to search, such as that of the previous frame, instead of in all directions: that
+            is faster, but stays on one side, so the result may be several times as long.
         stream : Stream, optional
 
         Returns

@@ -247,7 +247,7 @@ def _write_title(figure, picture):
 
 def _draw_times(axes, picture):
     if not len(picture.toc):
-        _say(axes, "Nothing touches\nin this step.")
+        _say(axes, "No contacts\nin this step.")
         return
     edges = np.linspace(0, 1, 41)
     counts = np.histogram(picture.toc, edges)[0]
@@ -273,7 +273,7 @@ def _say(axes, sentence):
 def _draw_history(axes, history):
     axes.set_facecolor(BACKGROUND)
     if not history.contacts.any():
-        _say(axes, f"Nothing touches in any of the {len(history.frames):,} steps.")
+        _say(axes, f"No contacts in any of the {len(history.frames):,} steps.")
         return
     axes.fill_between(history.frames, history.contacts, step="mid", color="#e0668c", alpha=0.35, linewidth=0)
     axes.step(history.frames, history.contacts, where="mid", color="#e0668c", linewidth=1.2)

@@ -104,7 +104,7 @@ def test_it_draws_and_steps_and_plays(browser, hpccd, small_bag, tmp_path):
 
     browser.press("Home", 36)
     assert browser.evaluate(STEP) == "1" and browser.evaluate("document.getElementById('back').disabled")
-    assert "Nothing touches in this step." in browser.evaluate("document.getElementById('notices').textContent")
+    assert "No contacts in this step." in browser.evaluate("document.getElementById('notices').textContent")
     browser.press(" ", 32)
     browser.wait(f"Number({STEP}) > 5")
     browser.press(" ", 32)

@@ -142,7 +142,7 @@ def test_times_of_contact_are_counted_beside_the_scene(count):
     figure = contacts.compose(picture_of(np.zeros((count, 3)), toc), history, size=(320, 200))
     scene, times, curve = figure.axes
     assert sum(bar.get_width() for bar in times.patches) == count
-    assert [text.get_text() for text in times.texts if not count] == ["Nothing touches\nin this step."] * (not count)
+    assert [text.get_text() for text in times.texts if not count] == ["No contacts\nin this step."] * (not count)
     assert times.axison == (count > 0)
     assert bool(scene.collections) == (count > 0)
     assert curve.lines[0].get_ydata().tolist() == [0, 7, 14, 21, 28] and curve.lines[1].get_xdata()[0] == 3
@@ -224,7 +224,7 @@ def test_a_spike_beyond_the_axis_is_named():
 def test_a_recording_without_contacts_says_so():
     history = contacts.History(np.arange(5), np.zeros(5, int), np.ones(5), 3)
     *_, curve = contacts.compose(picture_of(np.zeros((0, 3)), []), history, size=(320, 200)).axes
-    assert [text.get_text() for text in curve.texts] == ["Nothing touches in any of the 5 steps."]
+    assert [text.get_text() for text in curve.texts] == ["No contacts in any of the 5 steps."]
 
 
 TETRAHEDRON = np.array([[0, 0, -0.2], [0.3, 0, -1], [-0.2, 0.3, -1], [-0.2, -0.3, -1.0]])

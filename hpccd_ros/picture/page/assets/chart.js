@@ -75,7 +75,7 @@ class Chart {
     context.fillStyle = colours.faint;
     if (!steps.some((step) => step.total)) {
       context.textAlign = "center";
-      context.fillText("Nothing touches in any step.", width / 2, Chart.TOP + tall / 2);
+      context.fillText("No contacts in any step.", width / 2, Chart.TOP + tall / 2);
     }
     context.fillRect(Chart.LEFT, floor, width - Chart.LEFT - Chart.RIGHT, 1);
     context.textAlign = "center";

@@ -21,7 +21,7 @@ class Times {
       context.font = "13px system-ui, sans-serif";
       context.fillStyle = recording.colours.faint;
       const known = recording.steps[step].total !== null;
-      context.fillText(known ? "Nothing touches in this step." : "No contacts are known.", 0, 20);
+      context.fillText(known ? "No contacts in this step." : "No contacts are known.", 0, 20);
       return;
     }
     const most = Math.max(...counts, 1), left = 12, right = width - 52, top = 6, bottom = height - 18;

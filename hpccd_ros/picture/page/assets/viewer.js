@@ -172,7 +172,7 @@ class Viewer {
     byId("title").textContent = `${what} in step ${number} of ${steps.at(-1).step}`;
     // Lines break between facts only.
     byId("facts").textContent = facts.map((fact) => fact.replaceAll(" ", "\u00a0")).join("  ·  ") || "\u00a0";
-    const calm = total === 0 ? ["Nothing touches in this step."] : [];
+    const calm = total === 0 ? ["No contacts in this step."] : [];
     byId("notices").replaceChildren(...notices.map((text) => item(text)), ...calm.map((text) => item(text, "calm")));
     byId("slider").value = step;
     byId("place").textContent = `${step + 1} of ${steps.length}${time === null ? "" : `, ${time.toFixed(3)} s`}`;
