@@ -77,6 +77,9 @@ class StopListener:
         on_change: "Callable[[StopListener], None] | None" = None,
         clock_error: float = CLOCK_ERROR,
     ) -> None:
+        if not isinstance(topic, str):
+            remedy = f"; did you mean stop_timeout={topic}?" if isinstance(topic, (int, float)) else ""
+            raise TypeError(f"topic: expected a name, got {type(topic).__name__}{remedy}")
         profile: QoSProfile = stop_qos(stop_timeout)
         if isinstance(publishers, bool) or not isinstance(publishers, int):
             raise TypeError(f"publishers: expected how many, got {type(publishers).__name__}")

@@ -263,6 +263,7 @@ def test_a_publisher_that_promises_less_is_never_heard(place, profile):
         (dict(stop_timeout=0.0), ValueError, "stop_timeout: 0.0 s; give more than 0 s"),
         (dict(stop_timeout=float("nan")), ValueError, "stop_timeout: nan s"),
         (dict(stop_timeout="1"), TypeError, "stop_timeout: expected seconds, got str"),
+        (dict(topic=0.5), TypeError, r"topic: expected a name, got float; did you mean stop_timeout=0.5\?"),
         (dict(publishers=0), ValueError, "publishers: 0; at least one"),
         (dict(publishers=1.5), TypeError, "publishers: expected how many, got float"),
         (dict(publishers=True), TypeError, "publishers: expected how many, got bool"),

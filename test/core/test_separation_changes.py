@@ -97,7 +97,7 @@ def test_during_queries_each_result_is_of_one_state():
         (("nobody", 1, 0.1), ValueError, "^mesh_a: no mesh is named 'nobody'; the scene has mesh0, mesh1"),
         ((0, 5, 0.1), ValueError, r"^mesh_b: must lie in \[0, 4\], got 5"),
         ((-1, 0, 0.1), ValueError, r"^mesh_a: must lie in \[0, 4\], got -1"),
-        ((0, 1.0, 0.1), TypeError, "^mesh_b: expected an integer, got float"),
+        ((0, 1.0, 0.1), TypeError, "^mesh_b: expected the name or number of a mesh, got float"),
         ((True, 1, 0.1), TypeError, "^mesh_a: expected an integer, got bool"),
     ],
 )
