@@ -156,6 +156,15 @@ def reals(name: str, value: object) -> NDArray[np.float64]:
     return _as_float64(name, array)
 
 
+def vector(name: str, value: object) -> list[float]:
+    """Three numbers."""
+    array = reals(name, value)
+    if array.shape != (3,):
+        raise ValueError(f"{name}: expected shape (3,), got {array.shape}; give x, y and z")
+    x: list[float] = array.tolist()
+    return x
+
+
 def _is_integer(value: object) -> bool:
     return isinstance(value, (int, np.integer)) and not isinstance(value, np.timedelta64)
 

@@ -147,11 +147,8 @@ class SolidQueries(SnapshotCalls):
         >>> detector.separating_translation(positions, "a", "b", (-1, 0, 0))
         0.75
         """
-        a, b = (arguments.mesh_number(n, m, self._mesh_numbers) for n, m in (("mesh_a", mesh_a), ("mesh_b", mesh_b)))
-        along = arguments.reals("direction", direction)
-        if along.shape != (3,):
-            raise ValueError(f"direction: expected shape (3,), got {along.shape}")
-        s: float = self._ask("separating_translation", vertices, stream, a, b, along.tolist())
+        along = arguments.vector("direction", direction)
+        s: float = self._ask("separating_translation", vertices, stream, *self._pair(mesh_a, mesh_b), along)
         return s
 
     def penetration(
@@ -204,13 +201,14 @@ class SolidQueries(SnapshotCalls):
         >>> round(p.depth, 9), p.translation.round(9).tolist()
         (0.5, [0.0, 0.0, -0.5])
         """
-        a, b = (arguments.mesh_number(n, m, self._mesh_numbers) for n, m in (("mesh_a", mesh_a), ("mesh_b", mesh_b)))
-        place = None if start is None else arguments.reals("start", start)
-        if place is not None and place.shape != (3,):
-            raise ValueError(f"start: expected shape (3,), got {place.shape}")
-        found = self._ask("penetration", vertices, stream, a, b, None if place is None else place.tolist())
+        place = None if start is None else arguments.vector("start", start)
+        found = self._ask("penetration", vertices, stream, *self._pair(mesh_a, mesh_b), place)
         translation, depth, lower_bound, kind, features = found
         return Penetration(translation, depth, lower_bound, kind, tuple(features))
+
+    def _pair(self, mesh_a: MeshName, mesh_b: MeshName) -> tuple[int, int]:
+        numbers = self._mesh_numbers
+        return arguments.mesh_number("mesh_a", mesh_a, numbers), arguments.mesh_number("mesh_b", mesh_b, numbers)
 
     def _ask_points(self, query: str, vertices: object, points: object, mesh: MeshName, stream: object) -> Any:
         number = arguments.mesh_number("mesh", mesh, self._mesh_numbers)

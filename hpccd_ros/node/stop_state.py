@@ -273,7 +273,7 @@ class StopState:
     def _now(self) -> Why | None:
         if self._why is not None:
             if self._why.cause in (Cause.NEAR, Cause.INSIDE) and (old := self._too_old()):
-                return replace(old, text=f"{old.text}; in it, {self._why.text}")
+                return replace(old, text=f"{old.text}; the last result: {self._why.text}")
             return self._why
         for (cause, _), doubt in self._doubts.items():
             if doubt.meshes:

@@ -439,8 +439,8 @@ STOP_ROWS = (
         "float",
         -1.0,
         "Publish on stop whether different meshes were within this distance, or touched, during the last "
-        "step, or one is inside another, or positions are unknown; 0: without a distance; -1: no topic stop. It may be "
-        "changed at any time, but only switched on or off while the node is unconfigured",
+        "step, or one is inside another, or positions are unknown; 0: only touching counts as near; -1: no topic stop. "
+        "It may be changed at any time, but only switched on or off while the node is unconfigured",
         unit="unit of the vertices",
         span=(-1.0, FARTHEST),
         least=0.0,

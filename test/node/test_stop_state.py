@@ -83,7 +83,8 @@ def test_the_cause_is_silence_once_the_last_result_is_old(state, found):
     assert cause(state) == known
     state.times.pass_by(2)
     assert cause(state) == "silent"
-    assert "11 s ago" in state.why().text and "hand" in state.why().text and "table" in state.why().text
+    text = state.why().text
+    assert "11 s ago" in text and "the last result: hand" in text and "table" in text
     state.answered(found.get("near"), 0.25, [Origin(state.times.now)] * 3, inside=found.get("inside"))
     assert cause(state) == known
 

@@ -59,9 +59,7 @@ bool faces_meet(const V a[3], const V b[3]) {
 // true.
 template <class Use>
 bool any_near(const MovedPair& pair, const Moved& in_a, const Moved& in_b, Use&& use) {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> stack;
-  for (const std::uint32_t a : pair.a().roots)
-    for (const std::uint32_t b : pair.b().roots) stack.emplace_back(a, b);
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> stack{{0, 0}};
   const auto extent = [](const BoxedMesh::Box& box) {
     const V d = box.high - box.low;
     return d.x + d.y + d.z;
@@ -101,7 +99,7 @@ bool surfaces_meet(const MovedPair& pair, const Moved& in_a, const Moved& in_b) 
 // The winding number of a point, as in solid/winding.h, in a moved mesh that does not contain it in its surface.
 int winding_in(const BoxedMesh& mesh, const Moved& in_mesh, const V& point) {
   int winding = 0;
-  std::vector<std::uint32_t> stack(mesh.roots);
+  std::vector<std::uint32_t> stack{0};
   while (!stack.empty()) {
     const BoxedMesh::Node& node = mesh.nodes[stack.back()];
     stack.pop_back();
@@ -168,8 +166,7 @@ class DeepestVertexSearch {
         consider(mesh.faces[i][0], {INFINITY, 0, of_a, false, false, {}});
     }
     for (const bool of_a : {true, false})
-      if (contains(of_a))
-        for (const std::uint32_t n : inner(of_a).roots) push(n, {INFINITY, n, of_a, false, false, {}});
+      if (contains(of_a)) push(0, {INFINITY, 0, of_a, false, false, {}});
     std::uint32_t steps = 0;
     while (!heap_.empty() && heap_.front().most > best_) {
       if (++steps % 64 == 0) pair_.heed();
@@ -203,10 +200,10 @@ class DeepestVertexSearch {
 
   const BoxedMesh& inner(bool a) const { return a ? pair_.a() : pair_.b(); }
   const BoxedMesh& outer(bool of_a) const { return inner(!of_a); }
-  bool contains(bool of_a) const { return outer(of_a).topology->closed && !outer(of_a).roots.empty(); }
+  bool contains(bool of_a) const { return outer(of_a).topology->closed; }
   bool overlaps_outer(const BoxedMesh::Box& box, bool of_a) const {
     const BoxedMesh& mesh = outer(of_a);
-    return std::ranges::any_of(mesh.roots, [&](std::uint32_t n) { return overlap(box, mesh.nodes[n].box); });
+    return overlap(box, mesh.nodes[0].box);
   }
   bool inside(const V& given, bool of_a) const { return winding_in(outer(of_a), {pair_, {0, 0, 0}}, given) != 0; }
   static NearPoint known(const V& p, const Entry& of) {
@@ -283,7 +280,7 @@ class DeepestVertexSearch {
     const auto visit = [&](std::uint32_t n) {
       if (const double d = square_of_distance(p, mesh.nodes[n].box); d < limit) stack_.emplace_back(d, n);
     };
-    for (const std::uint32_t n : mesh.roots) visit(n);
+    visit(0);
     while (!stack_.empty()) {
       const auto [gap, n] = stack_.back();
       stack_.pop_back();

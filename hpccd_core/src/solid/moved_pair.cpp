@@ -69,7 +69,6 @@ MovedPair::MovedPair(const MotionBounds& snapshot, const Features& features, std
 void MovedPair::build(BoxedMesh& mesh, const Features& features, const Extent& extent) const {
   constexpr std::size_t leaf_size = 8;
   const std::uint32_t first = mesh.topology->first_face, n = mesh.topology->n_faces;
-  if (n == 0) return;
   const double up = 3 * scale_;
   double size = 0;
   for (int k = 0; k < 3; ++k) size = std::max(size, up * extent.high[k] - up * extent.low[k]);
@@ -85,7 +84,6 @@ void MovedPair::build(BoxedMesh& mesh, const Features& features, const Extent& e
     mesh.face_numbers.push_back(first + static_cast<std::uint32_t>(place.point));
     mesh.faces.push_back(features.faces[mesh.face_numbers.back()]);
   }
-  mesh.roots = {0};
   mesh.nodes.push_back({{}, 0, 0, n});
   for (std::uint32_t i = 0; i < mesh.nodes.size(); ++i) {
     const auto [box, none, begin, end] = mesh.nodes[i];
@@ -560,8 +558,7 @@ std::optional<ContactTime> Translation::search(double after, double before, doub
     const V d = box.high - box.low;
     return d.x + d.y + d.z;
   };
-  for (const std::uint32_t a : mesh_a.roots)
-    for (const std::uint32_t b : mesh_b.roots) push(a, b);
+  push(0, 0);
   LeavesInFrame leaves_a(*this, mesh_a, true), leaves_b(*this, mesh_b, false);
   std::uint32_t steps = 0;
   while (!heap.empty() && heap.front().key >= bound) {
@@ -634,7 +631,7 @@ void Translation::inside_during(std::uint32_t vertex, bool of_a, std::vector<Ran
   const BoxedMesh::Box point{x, x};
   const FaceInFrame here = in_frame({vertex, vertex, vertex}, of_a);
   std::vector<std::pair<double, int>> crossings;
-  std::vector<std::uint32_t> stack(outer.roots);
+  std::vector<std::uint32_t> stack{0};
   while (!stack.empty()) {
     const BoxedMesh::Node& node = outer.nodes[stack.back()];
     stack.pop_back();
@@ -672,7 +669,7 @@ int Translation::winding_after(std::uint32_t vertex, bool of_a, const ContactTim
   const std::array<std::uint32_t, 3> thrice{vertex, vertex, vertex};
   const FaceInFrame here = in_frame(thrice, of_a);
   int winding = 0;
-  std::vector<std::uint32_t> stack(outer.roots);
+  std::vector<std::uint32_t> stack{0};
   while (!stack.empty()) {
     const BoxedMesh::Node& node = outer.nodes[stack.back()];
     stack.pop_back();

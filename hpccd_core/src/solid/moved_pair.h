@@ -37,8 +37,7 @@ struct BoxedMesh {
     std::uint32_t children = 0;  // the left child; the right one follows it. 0: a leaf
     std::uint32_t first_face = 0, end_face = 0;
   };
-  std::vector<Node> nodes;                          // children come after their parents
-  std::vector<std::uint32_t> roots;                 // one, or none without faces
+  std::vector<Node> nodes;                          // the root first; children come after their parents
   std::vector<std::array<std::uint32_t, 3>> faces;  // vertices, in the order of the leaves
   std::vector<std::uint32_t> face_numbers;          // in the scene
   const MeshTopology* topology = nullptr;

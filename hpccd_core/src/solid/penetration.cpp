@@ -58,7 +58,7 @@ class HullOfPlaces {
     };
     double most = -INFINITY;
     V found{};
-    std::vector<std::uint32_t> stack = mesh.roots;
+    std::vector<std::uint32_t> stack{0};
     while (!stack.empty()) {
       const BoxedMesh::Node& node = mesh.nodes[stack.back()];
       stack.pop_back();
