@@ -6,7 +6,6 @@ import errno
 import os
 import shutil
 import stat
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -51,7 +50,9 @@ def whole_file(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         if why := no_folder(path) or no_folder(target):
             raise FileNotFoundError(errno.ENOENT, why)
-        folder = Path(tempfile.mkdtemp(prefix=f".{target.name[:_SHOWN]}.", suffix=".part", dir=target.parent))
+        # Its name is known before it is made, so that an interrupt in between removes it too.
+        folder = target.parent / f".{target.name[:_SHOWN]}.{os.urandom(8).hex()}.part"
+        folder.mkdir(mode=0o700)
         own = str(folder)
         draft = folder / target.name
         yield draft
