@@ -365,9 +365,9 @@ CollisionFreeMotion Detector::collision_free_motion(Positions t0, Positions t1, 
 namespace {
 
 Proximity as_proximity(Contacts&& c) {
-  return {std::move(c.vf),       std::move(c.vf_toc),  std::move(c.ee),
-          std::move(c.ee_toc),   std::move(c.closest), std::move(c.normals),
-          std::move(c.vertices), std::move(c.weights), c.hash,
+  return {std::move(c.vf),      std::move(c.vf_toc),  std::move(c.ee),       std::move(c.ee_toc),  std::move(c.vp),
+          std::move(c.vp_toc),  std::move(c.vv),      std::move(c.vv_toc),   std::move(c.ve),      std::move(c.ve_toc),
+          std::move(c.closest), std::move(c.normals), std::move(c.vertices), std::move(c.weights), c.hash,
           std::move(c.slices)};
 }
 

@@ -112,6 +112,10 @@ class HPCCD_API Detector {
   void set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
   /// Sets the separations of all pairs of n meshes: a symmetric n x n matrix, row by row.
   void set_separations(std::span<const double> of_pairs);
+  /// As Scene::set_thickness, from the next call on. Nothing is rebuilt.
+  void set_thickness(std::uint32_t mesh, std::span<const double> thickness);
+  /// Changes a plane from the next call on, by its number from Scene::add_plane.
+  void set_plane(std::uint32_t plane, const Plane& value);
 
   /// Cancels the detector: a running query, waiting ones and all later ones throw Cancelled, within 10 ms. Work that is
   /// already on a GPU runs to its end first. Thread-safe; does not wait.

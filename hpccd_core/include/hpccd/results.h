@@ -20,6 +20,9 @@ struct WorldSlices {
   std::vector<std::uint64_t> vf;      ///< worlds + 1 offsets: world k has the rows from [k] to [k + 1]
   std::vector<std::uint64_t> ee;      ///< as vf
   std::vector<std::uint64_t> ef;      ///< as vf
+  std::vector<std::uint64_t> vp;      ///< as vf
+  std::vector<std::uint64_t> vv;      ///< as vf
+  std::vector<std::uint64_t> ve;      ///< as vf
   std::vector<std::uint64_t> hashes;  ///< the hash of each world
 };
 
@@ -30,8 +33,14 @@ struct Contacts {
   std::vector<double> vf_toc;                    ///< time of impact: the earliest time at which the two touch
   std::vector<std::array<std::uint32_t, 4>> ee;  ///< the vertices of both edges
   std::vector<double> ee_toc;                    ///< time of impact
-  /// Contact points: vf rows, then ee rows; empty unless requested in Options. With a minimum separation, the midpoints
-  /// of the nearest points at toc.
+  std::vector<std::array<std::uint32_t, 2>> vp;  ///< vertex, plane: planes are counted in the order added
+  std::vector<double> vp_toc;                    ///< time of impact; 0 if the vertex starts outside the half-space
+  std::vector<std::array<std::uint32_t, 2>> vv;  ///< two points, the lower number first
+  std::vector<double> vv_toc;                    ///< time of impact
+  std::vector<std::array<std::uint32_t, 3>> ve;  ///< point, and the vertices of an edge of no face
+  std::vector<double> ve_toc;                    ///< time of impact
+  /// Contact points: rows of vf, ee, vp, vv and ve, as in all arrays below; empty unless requested in Options. With a
+  /// minimum separation, the midpoints of the nearest points at toc.
   std::vector<std::array<double, 3>> points;
   /// Unit normals: vf rows, then ee rows; empty unless requested in Options. The normal points to the side of the face
   /// on which the vertex is just before toc, or from edge a to the side on which edge b is then. For a contact at t = 0
@@ -75,6 +84,12 @@ struct Proximity {
   std::vector<double> vf_distance;                            ///< Euclidean distance
   std::vector<std::array<std::uint32_t, 4>> ee;               ///< the vertices of both edges
   std::vector<double> ee_distance;                            ///< Euclidean distance
+  std::vector<std::array<std::uint32_t, 2>> vp;               ///< vertex, plane, as in Contacts
+  std::vector<double> vp_distance;                            ///< negative outside the half-space
+  std::vector<std::array<std::uint32_t, 2>> vv;               ///< two points, as in Contacts
+  std::vector<double> vv_distance;                            ///< Euclidean distance
+  std::vector<std::array<std::uint32_t, 3>> ve;               ///< point and edge, as in Contacts
+  std::vector<double> ve_distance;                            ///< Euclidean distance
   std::vector<std::array<std::array<double, 3>, 2>> closest;  ///< vf rows first; empty unless requested
   /// Unit vectors from the point on the face to the vertex, or from edge a to edge b; zero at distance 0. Empty unless
   /// requested.
@@ -104,7 +119,7 @@ struct Intersections {
 };
 
 /// The kind of the closest pair of features. none: no pair exists. edge_face: the meshes intersect.
-enum class GapKind : std::uint8_t { none, vertex_face, edge_edge, edge_face };
+enum class GapKind : std::uint8_t { none, vertex_face, edge_edge, edge_face, vertex_plane, vertex_vertex, vertex_edge };
 /// Which of the two meshes of a gap lies inside the other.
 enum class Inside : std::uint8_t { none, a, b, both };
 /// The smallest distance of two meshes in one frame, and whether one lies inside the other.

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <unordered_set>
@@ -36,6 +37,22 @@ struct TestedFeatures {
 struct MeshOptions {
   bool self_collision = true;  ///< whether contacts within the mesh are reported
   bool is_static = false;      ///< the mesh never moves; pairs of two static meshes are never tested
+  /// Vertices in no face and no edge are points: tested against points and edges of no face too, not only against
+  /// faces.
+  bool points = false;
+};
+
+/// The half-space normal . x >= offset, bounded by a plane. The normal need not have unit length.
+struct Plane {
+  std::array<double, 3> normal{0, 0, 1};  ///< points into the half-space; not zero
+  double offset = 0;                      ///< normal . x on the plane
+  bool operator==(const Plane&) const = default;
+};
+
+/// Pairs of features of one mesh that are ignored because they were near each other at rest.
+struct RestFilter {
+  std::vector<double> vertices;  ///< x y z of each vertex of the mesh at rest
+  double distance = 0;           ///< pairs within this distance are ignored
 };
 
 class ScenePairs;
@@ -66,6 +83,31 @@ class HPCCD_API Scene {
   std::uint32_t add_mesh(std::string name, std::span<const std::uint32_t> faces, std::uint32_t n_vertices,
                          MeshOptions options = {}, std::span<const std::uint32_t> edges = {});
 
+  /// Adds a plane and returns its number, counted together with the meshes. Vertices that are not in the half-space, or
+  /// within the separation of its border, are in contact with it. A plane has no vertices. A static plane is not tested
+  /// against static meshes. Throws InvalidArgument if the name is taken, or if a number is not finite or the normal
+  /// zero.
+  std::uint32_t add_plane(std::string name, const Plane& plane, bool is_static = true);
+
+  /// Sets the thickness of a mesh: the separation of two features is that of their meshes plus the thickness of both.
+  /// One value for all features, or one for each face. A mesh without faces has one for each edge, a mesh without both
+  /// one for each vertex. Edges and vertices have the greatest thickness of the faces, or edges, that they are in.
+  /// Throws InvalidArgument if the number of values is another one, or if a value is negative or not finite.
+  void set_thickness(std::uint32_t mesh, std::span<const double> thickness);
+
+  /// Ignores pairs of features of one mesh with vertices that are joined by at most `rings` edges.
+  void ignore_within(std::uint32_t mesh, std::uint32_t rings);
+  /// Ignores pairs of features of one mesh that are within a distance of each other at rest. Throws InvalidArgument
+  /// unless `rest` has three finite coordinates per vertex of the mesh and the distance is finite and >= 0.
+  void ignore_within(std::uint32_t mesh, RestFilter rest);
+  /// Ignores some faces of a mesh, and edges and vertices that are in no other face, against another mesh. `faces` are
+  /// numbers of faces of the mesh; repeated calls add to them.
+  void ignore_faces(std::uint32_t mesh, std::span<const std::uint32_t> faces, std::uint32_t other);
+  /// Ignores single pairs of features: rows as in Contacts::vf and Contacts::ee, in scene-wide numbers; repeated calls
+  /// add to them.
+  void ignore_features(std::span<const std::array<std::uint32_t, 2>> vf,
+                       std::span<const std::array<std::uint32_t, 4>> ee);
+
   /// Nothing is tested between the two meshes.
   void ignore_pair(std::uint32_t mesh_a, std::uint32_t mesh_b);
   /// Sets the accuracy between the two meshes, instead of Options::accuracy.
@@ -79,14 +121,16 @@ class HPCCD_API Scene {
 
   /// A mesh, and the place of its vertices, faces and edges in the scene-wide arrays.
   struct Mesh {
-    std::string name;            ///< as given to add_mesh
-    MeshOptions options;         ///< as given to add_mesh
-    std::uint32_t first_vertex;  ///< scene-wide number of its first vertex
-    std::uint32_t n_vertices;    ///< number of its vertices
-    std::uint32_t first_face;    ///< its first face in faces()
-    std::uint32_t n_faces;       ///< number of its faces
-    std::uint32_t first_edge;    ///< its first edge in edges()
-    std::uint32_t n_edges;       ///< number of its edges in edges()
+    std::string name;                           ///< as given to add_mesh
+    MeshOptions options;                        ///< as given to add_mesh
+    std::uint32_t first_vertex;                 ///< scene-wide number of its first vertex
+    std::uint32_t n_vertices;                   ///< number of its vertices
+    std::uint32_t first_face;                   ///< its first face in faces()
+    std::uint32_t n_faces;                      ///< number of its faces
+    std::uint32_t first_edge;                   ///< its first edge in edges()
+    std::uint32_t n_edges;                      ///< number of its edges in edges()
+    std::optional<Plane> plane = std::nullopt;  ///< as given to add_plane; its mesh has no vertices
+    std::vector<double> thickness = {};         ///< as given to set_thickness; empty: zero
   };
   /// All meshes, in the order added.
   const std::vector<Mesh>& meshes() const { return meshes_; }
@@ -116,6 +160,11 @@ class HPCCD_API Scene {
   std::map<Pair, Accuracy> accuracy_;
   std::map<Pair, double> separation_;
   std::map<Pair, TestedFeatures> features_;
+  std::map<std::uint32_t, std::uint32_t> rings_;              // by mesh
+  std::map<std::uint32_t, RestFilter> rest_;                  // by mesh
+  std::map<Pair, std::vector<std::uint32_t>> ignored_faces_;  // by mesh and other mesh, in this order
+  std::vector<std::array<std::uint32_t, 2>> ignored_vf_;
+  std::vector<std::array<std::uint32_t, 4>> ignored_ee_;
 };
 
 }  // namespace v0_1
