@@ -20,6 +20,7 @@ from .elementary import test_edge_edge, test_vertex_face
 from .free_motion import CollisionFreeMotion
 from .mesh_files.errors import MeshFileError
 from .mesh_files.load import load_mesh
+from .mesh_files.welding import weld
 from .prepared import PreparedDetection
 from .proximity import Gap, Intersections, Proximity
 from .results import OutputNotComputed
@@ -55,6 +56,7 @@ __all__ = [
     "shapes",
     "test_edge_edge",
     "test_vertex_face",
+    "weld",
 ]
 
 _warn_of_several()

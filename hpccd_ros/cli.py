@@ -28,7 +28,7 @@ COMMANDS = {
     "doctor": "check a recording; save what is readable of one that was cut off",
     "scene": "generate, play or draw a deforming scene",
     "bench": "measure speed and latency on this machine",
-    "info": "what is installed here: versions, backends, processor",
+    "info": "what is installed here: versions, backends, processor; what is wrong with a mesh file",
 }
 
 # Commands that always load rcl.

@@ -11,7 +11,7 @@ from .. import _core
 from ..arguments import LARGEST_COORDINATE
 from . import collada, contents, obj, ply, stl
 from .errors import MeshFileError, shortened
-from .welding import weld
+from .welding import joined
 
 FORMATS = (".obj", ".ply", ".stl", ".dae")
 
@@ -132,7 +132,7 @@ def _parse(data: bytes, suffix: str) -> tuple[NDArray[np.float64], NDArray[np.in
         case ".stl":
             corners = stl.parse(data)
             _check(corners, len(corners))
-            first, vertex_of = weld(corners)
+            first, vertex_of = joined(corners)
             return corners[first], vertex_of.reshape(-1, 3)
         case ".dae":
             vertices, faces = collada.parse(data)

@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Show what is installed: versions, usable backends and accuracy tiers, processor, DDS settings.
+"""Show what is installed: versions, usable backends and accuracy tiers, processor, DDS settings. Examine a mesh file.
 
-hpccd info           as text, for bug reports
-hpccd info --json    as JSON, for programs
+hpccd info              as text, for bug reports
+hpccd info --json       as JSON, for programs
+hpccd info shirt.obj    counts of a mesh, lengths of its edges, and what disturbs collision detection:
+                        seams of doubled vertices, T-junctions, faces without area; with a remedy for each
 """
 
 import json
 import os
 import platform
 import sys
+from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
 
 import hpccd_ros
+from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.version import package_version
 from hpccd_ros.params.table import ACCURACIES
 
@@ -40,7 +44,19 @@ SETTINGS = (
 )
 
 
+# Places of a defect that the text shows.
+SHOWN = 3
+
+
 def configure(parser):
+    parser.add_argument("mesh", metavar="MESH", nargs="?", help="an .obj, .ply, .stl or .dae file to examine")
+    parser.add_argument(
+        "--distance",
+        metavar="D",
+        type=float,
+        help="of MESH: count vertices as doubled, and as lying on an edge, up to this distance (default: 0.001 of the "
+        "median edge)",
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
@@ -69,6 +85,10 @@ def gather() -> dict:
 
 
 def run(args) -> int:
+    if args.mesh is not None:
+        return _examine(args)
+    if args.distance is not None:
+        raise UserError("--distance belongs to a mesh file: hpccd info MESH --distance D")
     found = gather()
     if args.json:
         print(json.dumps(found, indent=2))
@@ -81,6 +101,64 @@ def run(args) -> int:
         else:
             print(f"{name:12} {', '.join(value) if isinstance(value, list) else value}")
     return 0
+
+
+def _examine(args) -> int:
+    import hpccd_core as hc
+    from hpccd_ros.detect import mesh_defects
+
+    if Path(args.mesh).suffix.lower() == ".mcap":
+        raise UserError(f"{args.mesh} is a recording: use hpccd doctor")
+    if args.distance is not None and not 0 <= args.distance < np.inf:
+        raise UserError(f"--distance: must be finite and not negative, got {args.distance}")
+    try:
+        report = mesh_defects.examine(*hc.load_mesh(args.mesh), args.distance)
+    except hc.MeshFileError as error:
+        raise UserError(str(error)) from error
+    if args.json:
+        found = asdict(report)
+        for defect in found["defects"]:
+            defect["indices"] = defect["indices"].tolist()
+        if found["smallest_gap"] == np.inf:
+            found["smallest_gap"] = None  # JSON has no infinity
+        print(json.dumps(found, indent=2))
+        return 0
+    print("\n".join(_lines(report)))
+    return 0
+
+
+def _lines(report):
+    """The report of a mesh as text."""
+
+    def if_welded(now, then):
+        return f"; {then} if welded" if now != then else ""
+
+    yes = {True: "yes", False: "no"}
+    closed, welded = yes[report.closed], yes[report.closed_if_welded]
+    of_welded = ", if welded" if report.defects and "doubled" in report.defects[0].name else ""
+    boundary = f", {report.boundary_edges} edges are in one face only" if report.boundary_edges else ""
+    yield f"{'vertices':14} {report.vertices}"
+    yield f"{'faces':14} {report.faces}"
+    components = report.components, report.components_if_welded
+    yield f"{'components':14} {report.components}{if_welded(*components)}"
+    yield f"{'closed':14} {closed}{boundary}{if_welded(closed, welded)}"
+    yield f"{'shortest edge':14} {report.shortest_edge:.6g}"
+    yield f"{'median edge':14} {report.median_edge:.6g}"
+    yield f"{'smallest gap':14} {report.smallest_gap:.6g}, between features that share no vertex{of_welded}"
+    yield f"{'distance':14} {report.distance:.3g}, up to which vertices count as doubled"
+    for defect in report.defects:
+        places = [", ".join(map(str, row)) for row in defect.indices[:SHOWN].tolist()]
+        more = "; ..." if len(defect.indices) > SHOWN else ""
+        yield f"\n{defect.name}: {len(defect.indices)}"
+        yield f"  where ({defect.of}): {'; '.join(places)}{more}"
+        yield f"  effect: {defect.effect}"
+        yield f"  remedy: {defect.remedy}"
+    if not report.defects:
+        yield "\nno defects"
+    yield (
+        "\nKeep separation and thickness below the smallest gap: above it, parts of the mesh are in contact at rest.\n"
+        "For a thicker mesh, ignore neighbours: scene.ignore_within(mesh, rings=2)."
+    )
 
 
 def _gpu(status) -> dict[str, str]:

@@ -4,7 +4,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from hpccd_core.mesh_files.welding import weld
+from hpccd_core.mesh_files.welding import joined
 
 
 class Welding:
@@ -23,7 +23,7 @@ class Welding:
         valid."""
         vertices = points[self._first] if len(points) == len(self._vertex_of) else None
         if vertices is None or not np.array_equal(vertices[self._vertex_of], points):
-            self._first, self._vertex_of = weld(points)
+            self._first, self._vertex_of = joined(points)
             self._faces = self._vertex_of.astype(np.uint32).reshape(-1, 3)
             vertices = points[self._first]
         return vertices, self._faces

@@ -125,6 +125,26 @@ def test_info(hpccd):
     assert Path(found["code"]).name == "hpccd_ros"
 
 
+def test_info_of_a_mesh(hpccd, tmp_path):
+    seam = tmp_path / "seam.obj"
+    seam.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 4 5 6\n")
+    done = hpccd("info", seam)
+    assert done.returncode == 0, done.stderr
+    assert "components     2; 1 if welded" in done.stdout and "doubled vertices: 2" in done.stdout
+    done = hpccd("info", seam, "--json", "--distance", "2")
+    found = json.loads(done.stdout)
+    assert found["distance"] == 2 and found["components_if_welded"] == 0 and found["smallest_gap"] is None
+    assert [d["indices"] for d in found["defects"]] == [[[3, 1], [5, 2]], [[1, 0], [2, 0], [3, 0], [4, 0], [5, 0]]]
+    for arguments, message in {
+        (seam, "--distance", "-1"): "--distance: must be finite and not negative, got -1.0",
+        ("run.mcap",): "run.mcap is a recording: use hpccd doctor",
+        (tmp_path / "no.obj",): "no such file",
+        ("--distance", "1"): "--distance belongs to a mesh file",
+    }.items():
+        done = hpccd("info", *arguments)
+        assert done.returncode == 2 and message in done.stderr and done.stderr.count("\n") == 1
+
+
 def test_interrupted_within_an_import():
     """numpy's C parts make an ImportError of the exception that a SIGINT raises while they load."""
     code = (

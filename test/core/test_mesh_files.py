@@ -20,7 +20,7 @@ from mesh_file_variants import ELL, FORMS, ply, stl, text_stl
 import hpccd_core as hc
 from hpccd_core.mesh_files import lines
 from hpccd_core.mesh_files.load import _parse as parse_file
-from hpccd_core.mesh_files.welding import weld
+from hpccd_core.mesh_files.welding import joined
 
 pytest.importorskip("mapbox_earcut")
 
@@ -407,7 +407,7 @@ def test_welding_lets_other_threads_go_on():
 
         thread = threading.Thread(target=tick)
         thread.start()
-        first, vertex_of = weld(points)
+        first, vertex_of = joined(points)
         done.set()
         thread.join()
         ticks.append(time.process_time())

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from hpccd_core.mesh_files.welding import weld
+from hpccd_core.mesh_files.welding import joined
 from hpccd_ros.frames.welding import Welding
 
 A, B, C, D = [0.0, 0, 0], [1.0, 0, 0], [0.0, 1, 0], [1.0, 1, 0]
@@ -11,15 +11,15 @@ SQUARE = np.array([A, B, C, D, C, B])
 
 
 def test_equal_points_are_one_vertex_in_the_order_of_first_use():
-    first, vertex_of = weld(SQUARE)
+    first, vertex_of = joined(SQUARE)
     assert (first.tolist(), vertex_of.tolist()) == ([0, 1, 2, 3], [0, 1, 2, 3, 2, 1])
     nearly = SQUARE.copy()
     nearly[4, 1] = np.nextafter(1.0, 2.0)
-    assert weld(nearly)[1].tolist() == [0, 1, 2, 3, 4, 1]
-    assert weld(SQUARE * [1, 1, -1] * 1.0)[1].tolist() == [0, 1, 2, 3, 2, 1]
+    assert joined(nearly)[1].tolist() == [0, 1, 2, 3, 4, 1]
+    assert joined(SQUARE * [1, 1, -1] * 1.0)[1].tolist() == [0, 1, 2, 3, 2, 1]
     signs = SQUARE.copy()
     signs[1, 1] = -0.0
-    assert weld(signs)[1].tolist() == [0, 1, 2, 3, 2, 1], "-0 is 0"
+    assert joined(signs)[1].tolist() == [0, 1, 2, 3, 2, 1], "-0 is 0"
 
 
 def test_the_same_faces_while_they_hold():

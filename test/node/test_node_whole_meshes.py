@@ -12,7 +12,7 @@ from visualization_msgs.msg import Marker
 from waving_sheet import scene_of, sheet_positions
 from whole_meshes import marker_of, shape_of
 
-from hpccd_core.mesh_files.welding import weld
+from hpccd_core.mesh_files.welding import joined
 from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.bag.writer import BagWriter
@@ -22,7 +22,7 @@ from hpccd_ros.record.recorded_topics import recording_info
 from hpccd_ros.record.topic_recorder import Recorder
 
 # As the node numbers the corners of a marker: vertices in the order of their first use.
-FIRST, VERTEX_OF = weld(sheet_positions(N, 0, dtype=np.float64)[FACES.reshape(-1)])
+FIRST, VERTEX_OF = joined(sheet_positions(N, 0, dtype=np.float64)[FACES.reshape(-1)])
 ORDER = FACES.reshape(-1)[FIRST]
 WELDED = VERTEX_OF.reshape(-1, 3).astype(np.uint32)
 
@@ -78,7 +78,7 @@ def test_a_stream_of_markers(start_node, tmp_path, hpccd):
 
     # Half of the sheet is another mesh: its first frame is only a start.
     half = FACES[: len(FACES) // 2]
-    first, vertex_of = weld(sheet(6)[half.reshape(-1)])
+    first, vertex_of = joined(sheet(6)[half.reshape(-1)])
     order, welded = half.reshape(-1)[first], vertex_of.reshape(-1, 3).astype(np.uint32)
     for k in (6, 7):
         send(node, "marker", marker_of(sheet(k), half, stamp=k + 1, frame_id="world"))
