@@ -130,6 +130,17 @@ def separation(value: object) -> float:
     return length("separation", value)
 
 
+def thickness(value: object) -> NDArray[np.float64]:
+    """A number or a list of them -> 1-D float64; the core sees how many the mesh needs."""
+    numbers = np.atleast_1d(reals("thickness", value))
+    if numbers.ndim != 1:
+        raise ValueError(f"thickness: expected a number or a list of them, got shape {numbers.shape}")
+    bad = np.flatnonzero(~(np.isfinite(numbers) & (numbers >= 0)))
+    if bad.size:
+        raise ValueError(f"thickness[{bad[0]}]: must be finite and not negative, got {numbers[bad[0]]}")
+    return numbers
+
+
 def real(name: str, value: Any) -> float:
     """The value as float. Raises ValueError if float64 cannot hold it exactly."""
     if isinstance(value, np.float32):

@@ -384,6 +384,27 @@ class Detector(
         n_meshes = len(self._layout.mesh_names)
         self._core.set_separations(arguments.lengths_of_pairs("of_pairs", of_pairs, n_meshes))
 
+    def set_thickness(self, mesh: MeshName, thickness: ArrayLike) -> None:
+        """From the next call on, give a mesh another thickness; nothing is rebuilt.
+
+        Parameters
+        ----------
+        mesh : str or int
+            Name or number of the mesh.
+        thickness : ArrayLike, scalar or shape (F,)
+            As in :meth:`Scene.add_mesh`.
+
+        Examples
+        --------
+        >>> import hpccd_core as hc
+        >>> scene = hc.Scene()
+        >>> _ = scene.add_mesh("cloth", [[0, 1, 2], [0, 2, 3]], thickness=0.01)
+        >>> detector = hc.Detector(scene)
+        >>> detector.set_thickness("cloth", [0.01, 0.03])
+        """
+        number = arguments.mesh_number("mesh", mesh, self._mesh_numbers)
+        self._core.set_thickness(number, arguments.thickness(thickness))
+
     def cancel(self) -> None:
         """End the use of this detector, from any thread and without waiting.
 

@@ -55,6 +55,7 @@ class Scene:
         n_vertices: int | None = None,
         self_collision: bool = True,
         static: bool = False,
+        thickness: ArrayLike = 0.0,
     ) -> int:
         """Add a mesh and return its number.
 
@@ -73,6 +74,10 @@ class Scene:
             Whether contacts within the mesh are reported.
         static : bool
             A promise that the mesh does not move during a step; pairs of static meshes are never tested.
+        thickness : ArrayLike, scalar or shape (F,)
+            Distance of the surface from the triangles, in the unit of the coordinates: the separation of two features
+            is that of their meshes plus the thickness of both. One number, or one for each face; edges and vertices
+            have the greatest of their faces. For a mesh without faces, one for each edge.
 
         Returns
         -------
@@ -98,8 +103,14 @@ class Scene:
         indices, segments = arguments.faces(faces), arguments.edges(edges)
         used = max(int(array.max()) + 1 if array.size else 0 for array in (indices, segments))
         n_vertices = used if n_vertices is None else arguments.whole_number("n_vertices", n_vertices, 0, _MOST)
+        numbers = arguments.thickness(thickness)
+        n_elements = len(indices) or len(segments) or n_vertices
+        if len(numbers) not in (1, n_elements):
+            raise ValueError(f"thickness: expected one number or {n_elements}, one for each face, got {len(numbers)}")
         # Copies, because the caller may write to these arrays later.
         self._repeat("add_mesh", (name, indices.copy(), n_vertices, self_collision, static, segments.copy()))
+        if numbers.any():
+            self._repeat("set_thickness", (self._ids[name], numbers.copy()))
         return self._ids[name]
 
     def ignore_pair(self, mesh_a: MeshName, mesh_b: MeshName) -> None:

@@ -5,7 +5,7 @@ set(hpccd_sources
   src/base/standard_arithmetic.cpp src/base/thread_affinity.cpp
   src/rigid/c_library.cpp src/rigid/joint_bounds.cpp src/rigid/joint_chain.cpp src/rigid/placed_vertices.cpp
   src/scene/edges.cpp src/scene/face_adjacency.cpp src/scene/features.cpp src/scene/pair_rules.cpp
-  src/scene/scene.cpp src/scene/separation_table.cpp
+  src/scene/scene.cpp src/scene/separation_table.cpp src/scene/thickness.cpp
   src/scene/static_meshes.cpp src/scene/tested_pairs.cpp
   src/bvh/build.cpp src/bvh/motion_bounds.cpp src/bvh/refit.cpp src/bvh/split.cpp src/bvh/squeezed_axis.cpp
   src/elementary/batch.cpp src/elementary/distance/distance_batch.cpp src/elementary/exact/contact.cpp

@@ -340,6 +340,12 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
       .def("set_accuracy", &Scene::set_accuracy, "mesh_a"_a, "mesh_b"_a, "accuracy"_a)
       .def("set_separation", &Scene::set_separation, "mesh_a"_a, "mesh_b"_a, "separation"_a)
       .def("set_features", &Scene::set_features, "mesh_a"_a, "mesh_b"_a, "features"_a)
+      .def(
+          "set_thickness",
+          [](Scene& s, std::uint32_t mesh, const Array<double>& values) {
+            s.set_thickness(mesh, {values.data(), static_cast<std::size_t>(values.size())});
+          },
+          "mesh"_a, "values"_a)
       .def_property_readonly("n_vertices", &Scene::n_vertices)
       .def_property_readonly("n_faces", [](const Scene& s) { return s.faces().size(); })
       .def(
@@ -483,6 +489,13 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
             unlocked_if_busy(d, [&] { d.set_separation(mesh_a, mesh_b, separation); });
           },
           "mesh_a"_a, "mesh_b"_a, "separation"_a)
+      .def(
+          "set_thickness",
+          [](Detector& d, std::uint32_t mesh, const Array<double>& values) {
+            const std::span<const double> numbers(values.data(), static_cast<std::size_t>(values.size()));
+            unlocked_if_busy(d, [&] { d.set_thickness(mesh, numbers); });
+          },
+          "mesh"_a, "values"_a)
       .def(
           "set_separations",
           [](Detector& d, const Array<double>& of_pairs) {

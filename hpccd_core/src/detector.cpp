@@ -520,6 +520,17 @@ void Detector::set_separations(std::span<const double> of_pairs) {
         impl_->common.separations.set(a, b, d);
 }
 
+void Detector::set_thickness(std::uint32_t mesh, std::span<const double> thickness) {
+  const StandardArithmetic arithmetic;
+  const auto& meshes = impl_->common.scene->meshes();
+  if (mesh >= meshes.size())
+    throw InvalidArgument("mesh: the scene has " + std::to_string(meshes.size()) +
+                          " meshes; give a number that Scene::add_mesh() returned");
+  check_thickness(meshes[mesh], thickness);
+  const std::lock_guard lock(impl_->one_call);
+  impl_->common.thickness.set(mesh, thickness);
+}
+
 void Detector::cancel() { impl_->cancellation().request(); }
 
 std::map<std::string, double> Detector::profile() const {
@@ -538,8 +549,8 @@ std::map<std::string, std::uint64_t> Detector::stats() const {
   d.backends().count(d.asked, stats);
   stats.insert(d.found->begin(), d.found->end());
   stats["triangles"] = d.common.features.n_faces();
-  stats["bytes"] +=
-      d.engine->shared.tree.bytes() + d.common.features.bytes() + d.common.separations.bytes() + d.common.rules.bytes();
+  stats["bytes"] += d.engine->shared.tree.bytes() + d.common.features.bytes() + d.common.separations.bytes() +
+                    d.common.thickness.bytes() + d.common.rules.bytes();
   if (d.options().worlds > 1) stats["worlds"] = d.options().worlds;
   return stats;
 }

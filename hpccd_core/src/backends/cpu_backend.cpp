@@ -135,14 +135,14 @@ void CpuBackend::begin_motion(Positions t0, Positions t1, Tests tests) { begin_m
 
 void CpuBackend::begin_motion(Positions t0, Positions t1, Tests tests, MovingTree& tree) {
   const Options& o = shared_.options;
-  tree.bound(t0, t1, shared_.separations.largest());
+  tree.bound(t0, t1, shared_.common.growth());
   shared_.profiler.mark("bounds");
   const MotionBounds& motion = tree.motion();
   const bool rounds = floats_suffice(motion.short_edge, motion.map.scale), here = tests == Tests::all_here;
   search_.emplace(tree.tree(), shared_.rules, o.simd, here && rounds);
   begin(*search_, motion);
   search_->geometry.separations = shared_.separations_now();
-  search_->geometry.margin = {shared_.separations.most() + motion.rounding, motion.map.scale};
+  search_->geometry.margin = {shared_.most_separation() + motion.rounding, motion.map.scale};
   search_->geometry.rounded = rounds ? motion.rounded.data() : nullptr;
   search_->excess = Excess(motion, shared_.separations);
   search_->report = !here && o.report == Report::any ? Report::all : o.report;
@@ -251,7 +251,9 @@ void CpuBackend::end_world(WorldMemory& memory) {
 
 std::optional<Contacts> CpuBackend::proximity(Positions vertices, double distance) {
   ProximitySearch search(shared_.tree.tree(), shared_.rules, shared_.options.simd);
-  begin_proximity(vertices, distance, search);
+  begin_proximity(vertices, distance + shared_.common.thickness.most_of_two() * (1 + 1e-15), search);
+  search.geometry.separations.uniform = distance;
+  search.geometry.separations.thickness = shared_.common.thickness.view();
   counts_.asked[0] = counts_.asked[1] = true;
   walk_tree(search);
   return collect(search, Outputs::of_proximity(shared_.options));
@@ -273,14 +275,19 @@ std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
   fit_snapshot(vertices);
   if (!mesh_pairs_) mesh_pairs_.emplace(shared_.rules, shared_.scene->meshes().size());
   if (!containment_) containment_.emplace(*shared_.scene, shared_.features, *mesh_pairs_);
-  NearestPairs nearest(*mesh_pairs_, shared_.features, shared_.tree.motion(), shared_.tree.tree());
+  NearestPairs nearest(*mesh_pairs_, shared_.features, shared_.tree.motion(), shared_.tree.tree(),
+                       shared_.common.thickness);
   DistanceSearch search(shared_.tree.tree(), shared_.rules, shared_.options.simd, nearest);
   begin(search);
+  search.geometry.separations.thickness = shared_.common.thickness.view();
   counts_.asked[0] = counts_.asked[1] = counts_.asked[2] = true;
   walk_tree(search);
   std::vector<Gap> gaps = collect_gaps(nearest, search.geometry, shared_.cancellation);
   shared_.profiler.mark("contacts");
   containment_->decide(gaps, shared_.tree.tree(), shared_.tree.motion(), contained_, shared_.pool);
+  for (std::size_t i = 0; i < gaps.size(); ++i)
+    if (const NearestPair& pair = nearest.found(i); gaps[i].kind != GapKind::none)
+      gaps[i].distance -= search.geometry.separations.thickness_of(pair.kind, pair.first, pair.second);
   shared_.profiler.mark("containment");
   shared_.cancellation.heed();
   return gaps;
@@ -333,7 +340,7 @@ std::optional<Penetration> CpuBackend::penetration(Positions vertices, std::arra
 void CpuBackend::begin_proximity(Positions vertices, double distance, ProximitySearch& search) {
   fit_snapshot(vertices, distance);
   begin(search);
-  search.geometry.separations = {distance};
+  search.geometry.separations.uniform = distance;
   search.reach = reach_of(distance, shared_.tree.motion().box_rounding, shared_.tree.motion().box_scale);
 }
 
@@ -458,7 +465,7 @@ void CpuBackend::begin_earliest(Positions t0, Positions t1, bool time_only) {
 
 // Tests the near pairs; returns whether they were sufficient. The best time so far is known in any case.
 bool CpuBackend::answer_from_near_pairs() {
-  if (const std::uint64_t now = shared_.separations.version(); near_.radius().separations != now)
+  if (const std::uint64_t now = shared_.common.version_of_separations(); near_.radius().separations != now)
     near_ = {}, near_.radius().separations = now, drift_of_.reset();
   test_groups(near_.hints);
   if (!search_->over()) test_groups(near_.groups());
@@ -490,7 +497,7 @@ bool CpuBackend::list_near_pairs(Positions t0) {
   std::optional<double> radius = list.next(travel_, search_->earliest);
   const bool wide = !radius && list.edge > 0 && list.wider_would_pay();
   if (wide) radius = wide_radius();
-  const std::optional<double> distance = listed_distance(radius, shared_.separations.most());
+  const std::optional<double> distance = listed_distance(radius, shared_.most_separation());
   if (!distance) return false;
   ProximitySearch search(shared_.tree.tree(), shared_.rules, shared_.options.simd);
   begin_proximity(t0, *distance, search);
@@ -532,7 +539,7 @@ bool CpuBackend::answer_from_unlisted_pairs(bool time_only) {
   if (!shared_.tree.built()) return false;
   if (!near_.radius().known() || near_.snapshot().size() != shared_.tree.motion().vertices.size()) return false;
   update_drift();
-  drift_.listed_within(near_.radius().listed(), shared_.separations.most());
+  drift_.listed_within(near_.radius().listed(), shared_.most_separation());
   FoundContacts found = take_found(workers_);
   const std::optional<std::vector<LeafPair>> open = open_pairs();
   shared_.profiler.mark("near_pairs");
@@ -556,7 +563,7 @@ std::optional<double> CpuBackend::wide_radius() {
   constexpr double longest = 0.6;  // of an edge; with 0.7 all neighbours of a regular mesh are near
   const std::size_t n_leaves = shared_.tree.tree().leaves.size();
   for (const double part : {0.25, 0.4, longest}) {
-    drift_.listed_within(part * near_.radius().edge, shared_.separations.most());
+    drift_.listed_within(part * near_.radius().edge, shared_.most_separation());
     const std::optional<std::vector<LeafPair>> open = open_pairs();
     if (open && open->size() <= (part < longest ? n_leaves / 2 : n_leaves)) return part * near_.radius().edge / 2;
   }

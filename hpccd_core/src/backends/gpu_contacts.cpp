@@ -181,7 +181,7 @@ UndecidedPair undecided_pair(const Features& features, const Separations& separa
                              Positions t0, Positions t1) {
   std::uint32_t v[4];
   pair_vertices(topology(features), pair.kind, pair.first, pair.second, v);
-  UndecidedPair q{pair.kind, {}, {}, separations.look_up(v[0], v[2])};
+  UndecidedPair q{pair.kind, {}, {}, separations.look_up(pair.kind, pair.first, pair.second, v)};
   for (int k = 0; k < 4; ++k) q.t0[k] = position(t0, v[k]), q.t1[k] = position(t1, v[k]);
   return q;
 }

@@ -5,9 +5,9 @@
 
 namespace hpccd {
 
-void MovingTree::bound(Positions t0, Positions t1, std::span<const double> separations) {
+void MovingTree::bound(Positions t0, Positions t1, const Growth& growth) {
   followed_ = std::exchange(fits_, false);
-  motion_.update(scene_, t0, t1, separations, pool_);
+  motion_.update(scene_, t0, t1, growth, pool_);
 }
 
 void MovingTree::bound(Positions vertices, double distance) {

@@ -56,7 +56,7 @@ class MovingTree {
   }
 
   // Bounds of a new motion. Throws InvalidArgument like MotionBounds::update.
-  void bound(Positions t0, Positions t1, std::span<const double> separations);
+  void bound(Positions t0, Positions t1, const Growth& growth);
   // The same for one snapshot.
   void bound(Positions vertices, double distance = 0);
   // Other ends of these vertices, within the bounds that they have.

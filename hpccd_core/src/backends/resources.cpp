@@ -14,6 +14,7 @@ Common::Common(std::shared_ptr<const Scene> of, const Options& wanted, int threa
       pool(threads),
       features(features_of(*scene, pool)),
       separations(*scene, wanted.minimum_separation),
+      thickness(*scene, features),
       rules(*scene, wanted.accuracy, separations, wanted.features),
       settled_(separations.version()) {
   require_some("features", wanted.features);
@@ -23,9 +24,11 @@ Common::Common(std::shared_ptr<const Scene> of, const Options& wanted, int threa
   options.simd = resolve(wanted.simd);
   options.threads = pool.size();
   pool.heed(cancellation);
+  rules.set_thick(thickness.any());
 }
 
 void Common::settle() {
+  rules.set_thick(thickness.any());
   if (settled_ == separations.version()) return;
   rules.change(separations);
   separations.settle();
@@ -33,10 +36,18 @@ void Common::settle() {
 }
 
 Separations Common::separations_now() const {
-  if (separations.uniform()) return {separations.first()};
+  Separations now;
+  now.thickness = thickness.view();
+  if (separations.uniform()) {
+    now.uniform = separations.first();
+    return now;
+  }
   const PairValues<double> pairs = separations.of_pairs();
-  Separations now{0, pairs.all, features.mesh_of_vertex.data(), pairs.n_meshes};
-  if (!pairs.all) now.of_pairs = pairs;
+  now.mesh_of_vertex = features.mesh_of_vertex.data(), now.n_meshes = pairs.n_meshes;
+  if (pairs.all)
+    now.of_meshes = pairs.all;
+  else
+    now.of_pairs = pairs;
   return now;
 }
 

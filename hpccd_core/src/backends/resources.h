@@ -11,6 +11,7 @@
 #include "elementary/distance/separations.h"
 #include "scene/features.h"
 #include "scene/separation_table.h"
+#include "scene/thickness.h"
 #include "traverse/tasks.h"
 
 namespace hpccd {
@@ -26,12 +27,22 @@ struct Common {
   ThreadPool pool;
   Features features;
   SeparationTable separations;
+  ThicknessTable thickness;
   PairRules rules;
 
   // At the beginning of each call: applies separations that were set since the last one.
   void settle();
   // The current separations, for tests.
   Separations separations_now() const;
+  bool any_separation() const { return separations.any() || thickness.any(); }
+  // By how much the boxes of a motion grow.
+  Growth growth() const {
+    return {separations.largest(), thickness.view().of_vertex, thickness.largest_of_meshes(), thickness.version()};
+  }
+  // An upper bound of the separation of two features.
+  double most_separation() const { return (separations.most() + thickness.most_of_two()) * (1 + 1e-15); }
+  // Differs between any two states in which the separation of two features differs.
+  std::uint64_t version_of_separations() const { return separations.version() + thickness.version(); }
 
  private:
   std::uint64_t settled_;  // version of the separations
@@ -55,6 +66,7 @@ struct Resources {
   Profiler profiler;
 
   Separations separations_now() const { return common.separations_now(); }
+  double most_separation() const { return common.most_separation(); }
 };
 
 }  // namespace hpccd

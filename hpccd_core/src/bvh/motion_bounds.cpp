@@ -32,12 +32,13 @@ Extent extent_of(const Real* x, std::size_t begin, std::size_t end, double large
   return e;
 }
 
-// box_map(x, k): coordinate k of a box. of_any_part: see MotionBounds; for grown boxes.
-template <bool grown, class Real, class BoxMap>
-void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, const BoxMap& box_map, double margin,
+// box_map(x, k): coordinate k of a box. margin_of(i), of_any_part (see MotionBounds): for grown boxes.
+template <bool grown, class Real, class BoxMap, class Margin>
+void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, const BoxMap& box_map, Margin&& margin_of,
                  bool of_any_part, std::size_t begin, std::size_t end, VertexMotion* vertices, RoundedMotion* rounded,
                  MotionBox* boxes, VertexKdop* kdops) {
   for (std::size_t i = begin; i < end; ++i) {
+    [[maybe_unused]] const double margin = margin_of(i);
     for (int k = 0; k < 3; ++k) {
       const double a = t0[3 * i + k], b = t1[3 * i + k];
       const float at_t0 = map(a, k), at_t1 = map(b, k);
@@ -136,8 +137,7 @@ void Extent::include(const Extent& e) {
 }
 
 template <class Real>
-void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::span<const double> separations,
-                          ThreadPool& pool) {
+void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, const Growth& growth, ThreadPool& pool) {
   if (snapshot_ != was_snapshot_) resting.clear();  // a value allowed for one may be too large for the other
   const auto moves = [&](std::size_t part) { return resting.empty() || !resting[part]; };
   std::vector<Piece> pieces = pieces_of(parts_, moves);
@@ -167,10 +167,20 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
   rounding = 1e-15 * most;
   measure_edges(t0, t1);
   std::vector<double> margins(parts_.size(), 0);
-  if (!separations.empty() && n > 0)
-    for (std::size_t p = 0; p < parts_.size(); ++p) margins[p] = margin_for(separations[p], whole);
-  const bool same_margins = margins == margins_;
+  if (!growth.separations.empty() && n > 0)
+    for (std::size_t p = 0; p < parts_.size(); ++p) margins[p] = margin_for(growth.separations[p], whole);
+  bool same_margins = margins == margins_;
   margins_ = std::move(margins);
+  largest_here_ = most, scene_size_ = 0, thicker_than_scene_ = false;
+  for (int k = 0; n > 0 && k < 3; ++k) scene_size_ = std::max(scene_size_, whole.high[k] - whole.low[k]);
+  thickness_ = growth.thickness;
+  std::vector<double> thickest;
+  for (const double t : growth.thickest) {
+    thickest.push_back(thickness_in_box(t));
+    thicker_than_scene_ = thicker_than_scene_ || t > scene_size_;
+  }
+  same_margins = same_margins && thickest == thickest_ && version_of_thickness_ == growth.version_of_thickness;
+  thickest_ = std::move(thickest), version_of_thickness_ = growth.version_of_thickness;
   const std::vector<SqueezedAxis> old_squeezed = std::move(squeezed);
   squeezed.clear();
   box_scale = map.scale, box_rounding = rounding;
@@ -181,7 +191,7 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
     resting.clear();
     pieces = pieces_of(parts_, moves);
   }
-  grown = of_any_part || std::ranges::any_of(margins_, [](double margin) { return margin > 0; });
+  grown = of_any_part || thickness_ || std::ranges::any_of(margins_, [](double margin) { return margin > 0; });
   was_snapshot_ = snapshot_;
   resize(vertices, n, pool.cancellation());
   resize(boxes, n, pool.cancellation());
@@ -208,7 +218,7 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
     for (std::size_t i = from; i < to; ++i) {
       const auto [begin, end, part] = pieces[i];
       if (!snapshot_)
-        copy(t0, t1, begin, end, margins_[part]);
+        copy(t0, t1, begin, end, part);
       else if (!squeezed.empty())
         copy_snapshot(t0, squeezed_map, chosen_slanted, begin, end, vertices.data(), boxes.data());
       else if (!common)
@@ -220,26 +230,41 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
 }
 
 template <class Real>
-void MotionBounds::copy(const Real* t0, const Real* t1, std::size_t begin, std::size_t end, double margin) {
+void MotionBounds::copy(const Real* t0, const Real* t1, std::size_t begin, std::size_t end, std::size_t part) {
+  const double margin = margins_[part];
   const auto copy = [&](const auto& box_map) {
-    if (margin > 0 || of_any_part)
-      copy_motion<true>(t0, t1, map, box_map, margin, of_any_part, begin, end, vertices.data(), rounded.data(),
-                        boxes.data(), kdops.data());
+    if (thickness_ && thickest_[part] > 0)
+      copy_motion<true>(
+          t0, t1, map, box_map, [&](std::size_t i) { return margin + thickness_in_box(thickness_[i]); }, of_any_part,
+          begin, end, vertices.data(), rounded.data(), boxes.data(), kdops.data());
+    else if (margin > 0 || of_any_part)
+      copy_motion<true>(
+          t0, t1, map, box_map, [&](std::size_t) { return margin; }, of_any_part, begin, end, vertices.data(),
+          rounded.data(), boxes.data(), kdops.data());
     else
-      copy_motion<false>(t0, t1, map, box_map, 0, false, begin, end, vertices.data(), rounded.data(), boxes.data(),
-                         kdops.data());
+      copy_motion<false>(
+          t0, t1, map, box_map, [](std::size_t) { return 0.0; }, false, begin, end, vertices.data(), rounded.data(),
+          boxes.data(), kdops.data());
   };
   squeezed.empty() ? copy(map) : copy(squeezed_map());
+}
+
+// The part of a margin that is due to a thickness. The margin is at most twice the scene's extent for a separation,
+// plus this: rounding errors of both sums, of the sum of separation and thicknesses, and of x - margin and x + margin.
+double MotionBounds::thickness_in_box(double thickness) const {
+  if (!(thickness > 0)) return 0;
+  const double reach = std::min(thickness, scene_size_);
+  return reach + 2e-15 * (largest_here_ + 2 * scene_size_);
 }
 
 void MotionBounds::shorten(Positions t0, Positions t1, std::span<const std::uint32_t> changed, ThreadPool& pool) {
   parallel_for(pool, changed.size(), grain, [&](std::size_t begin, std::size_t end, int) {
     for (const std::uint32_t i : changed.subspan(begin, end - begin)) {
-      const double margin = margins_[features->mesh_of_vertex[i]];
+      const std::size_t part = features->mesh_of_vertex[i];
       if (t0.is_double)
-        copy(static_cast<const double*>(t0.data), static_cast<const double*>(t1.data), i, i + 1, margin);
+        copy(static_cast<const double*>(t0.data), static_cast<const double*>(t1.data), i, i + 1, part);
       else
-        copy(static_cast<const float*>(t0.data), static_cast<const float*>(t1.data), i, i + 1, margin);
+        copy(static_cast<const float*>(t0.data), static_cast<const float*>(t1.data), i, i + 1, part);
     }
   });
 }
@@ -308,7 +333,7 @@ void MotionBounds::squeeze(const Real* t0, const Real* t1, std::size_t n, double
           stretches[i] = {x, x};
         } else {
           const double a = t0[3 * i + k], b = t1[3 * i + k];
-          stretches[i] = {std::min(a, b) - margins_[p], std::max(a, b) + margins_[p]};
+          stretches[i] = {std::min(a, b) - growth_of_mesh(p), std::max(a, b) + growth_of_mesh(p)};
         }
       }
     axes[axis].emplace(stretches, wanted, least);
@@ -331,12 +356,12 @@ void MotionBounds::squeeze(const Real* t0, const Real* t1, std::size_t n, double
   if (coarse) box_rounding = 0;
 }
 
-void MotionBounds::update_all(Positions t0, Positions t1, std::span<const double> separations, ThreadPool& pool) {
+void MotionBounds::update_all(Positions t0, Positions t1, const Growth& growth, ThreadPool& pool) {
   if (!std::exchange(complete_, false)) resting.clear();
   if (t0.is_double)
-    update(static_cast<const double*>(t0.data), static_cast<const double*>(t1.data), t0.n, separations, pool);
+    update(static_cast<const double*>(t0.data), static_cast<const double*>(t1.data), t0.n, growth, pool);
   else
-    update(static_cast<const float*>(t0.data), static_cast<const float*>(t1.data), t0.n, separations, pool);
+    update(static_cast<const float*>(t0.data), static_cast<const float*>(t1.data), t0.n, growth, pool);
   complete_ = true;
 }
 
@@ -347,12 +372,11 @@ void MotionBounds::divide(const Scene& scene) {
     parts_.push_back({m.first_vertex, std::size_t{m.first_vertex} + m.n_vertices});
 }
 
-void MotionBounds::update(const Scene& scene, Positions t0, Positions t1, std::span<const double> separations,
-                          ThreadPool& pool) {
+void MotionBounds::update(const Scene& scene, Positions t0, Positions t1, const Growth& growth, ThreadPool& pool) {
   divide(scene);
   resting = statics_.unchanged(scene, t0, t1, pool);
   largest_ = largest_coordinate, snapshot_ = false, distance_ = 0;
-  update_all(t0, t1, separations, pool);
+  update_all(t0, t1, growth, pool);
 }
 
 void MotionBounds::update(const Scene& scene, Positions vertices, ThreadPool& pool, double distance) {

@@ -30,6 +30,14 @@ struct Extent {
   void include(const Extent& e);
 };
 
+// By how much boxes grow beyond their vertices, so that those of features within their separation overlap.
+struct Growth {
+  std::span<const double> separations;    // by mesh, the largest of its pairs; empty: none
+  const double* thickness = nullptr;      // by vertex; null: none
+  std::span<const double> thickest = {};  // by mesh
+  std::uint64_t version_of_thickness = 0;
+};
+
 struct MotionBounds {
   // Their edges show how fine the scene is. Without features the scene counts as coarse.
   const Features* features = nullptr;
@@ -59,11 +67,9 @@ struct MotionBounds {
   // Boxes of the whole sweep, for methods that need them.
   std::vector<Box> swept;
 
-  // Boxes of features that come within a separation of each other overlap as well. `separations`: by mesh, the largest
-  // of its pairs; empty: none. Throws InvalidArgument if a coordinate is not finite or too large, or if a static mesh
-  // moves.
-  void update(const Scene& scene, Positions vertices_t0, Positions vertices_t1, std::span<const double> separations,
-              ThreadPool& pool);
+  // Boxes of features that come within their separation of each other overlap as well. Throws InvalidArgument if a
+  // coordinate is not finite or too large, or if a static mesh moves.
+  void update(const Scene& scene, Positions vertices_t0, Positions vertices_t1, const Growth& growth, ThreadPool& pool);
   // For one snapshot: a motion without displacement, whose boxes have bounds along other directions in place of the
   // second end (SlantedDirection); without k-DOPs. `distance`: features count as near up to this distance, if it is
   // known.
@@ -75,20 +81,25 @@ struct MotionBounds {
   void sweep(ThreadPool& pool);
   // Smallest and largest coordinates of its vertices.
   const Extent& extent_of_mesh(std::size_t mesh) const { return extents_[mesh]; }
-  // The amount by which its boxes have grown, in the scene's coordinates.
+  // The amount by which its boxes have grown for separations of pairs of meshes, in the scene's coordinates.
   double margin_of_mesh(std::size_t mesh) const { return margins_[mesh]; }
+  // The largest amount by which its boxes have grown.
+  double growth_of_mesh(std::size_t mesh) const { return margins_[mesh] + (thickest_.empty() ? 0 : thickest_[mesh]); }
+  // Whether boxes have grown by less than their thickness, because it exceeds the scene.
+  bool thicker_than_scene() const { return thicker_than_scene_; }
   std::size_t bytes() const;
 
  private:
   void divide(const Scene& scene);
   template <class Real>
-  void update(const Real* t0, const Real* t1, std::size_t n, std::span<const double> separations, ThreadPool& pool);
-  void update_all(Positions t0, Positions t1, std::span<const double> separations, ThreadPool& pool);
+  void update(const Real* t0, const Real* t1, std::size_t n, const Growth& growth, ThreadPool& pool);
+  void update_all(Positions t0, Positions t1, const Growth& growth, ThreadPool& pool);
   auto squeezed_map() const {
     return [this](double x, int k) { return squeezed[static_cast<std::size_t>(k)](x); };
   }
   template <class Real>
-  void copy(const Real* t0, const Real* t1, std::size_t begin, std::size_t end, double margin);
+  void copy(const Real* t0, const Real* t1, std::size_t begin, std::size_t end, std::size_t part);
+  double thickness_in_box(double thickness) const;
   template <class Real>
   void measure_edges(const Real* t0, const Real* t1);
   double finest() const;
@@ -96,9 +107,14 @@ struct MotionBounds {
   void squeeze(const Real* t0, const Real* t1, std::size_t n, double finest, const Extent& whole, ThreadPool& pool);
 
   StaticMeshes statics_;
-  std::vector<VertexRange> parts_;  // of each mesh
-  std::vector<Extent> extents_;     // range of each part when it was last computed
-  std::vector<double> margins_;     // of each part's boxes
+  std::vector<VertexRange> parts_;     // of each mesh
+  std::vector<Extent> extents_;        // range of each part when it was last computed
+  std::vector<double> margins_;        // of each part's boxes
+  const double* thickness_ = nullptr;  // Growth::thickness, during a call
+  std::vector<double> thickest_;       // of each part, as in its boxes; empty: none
+  std::uint64_t version_of_thickness_ = 0;
+  double scene_size_ = 0, largest_here_ = 0;  // the scene's largest extent and coordinate
+  bool thicker_than_scene_ = false;
   std::array<SlantedDirection, 3> slanted_;
   double distance_ = 0, largest_ = largest_coordinate;
   bool snapshot_ = false, was_snapshot_ = false;

@@ -19,7 +19,7 @@ std::array<double, 3> point_of(const V& v) { return {v.x, v.y, v.z}; }
 Gap gap_of(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& found, const Geometry& g) {
   Gap gap{mesh_a, mesh_b};
   if (!(found.distance < INFINITY)) return gap;
-  gap.distance = found.distance;
+  gap.distance = found.without_thickness;
   if (found.kind == Kind::edge_face) {
     gap.kind = GapKind::edge_face;
     gap.features = {g.edges[found.first][0], g.edges[found.first][1], found.second};

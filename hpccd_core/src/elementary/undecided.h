@@ -11,7 +11,7 @@ namespace hpccd {
 inline UndecidedPair undecided_pair(const Geometry& g, const Candidate& pair) {
   std::uint32_t v[4];
   pair_vertices(g, pair.kind, pair.first, pair.second, v);
-  UndecidedPair q{pair.kind, {}, {}, g.separations.look_up(v[0], v[2])};
+  UndecidedPair q{pair.kind, {}, {}, g.separations.look_up(pair.kind, pair.first, pair.second, v)};
   pair_positions(g, pair.kind, pair.first, pair.second, q.t0, q.t1);
   return q;
 }

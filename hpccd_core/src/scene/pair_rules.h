@@ -18,7 +18,7 @@ inline constexpr std::uint32_t mixed_meshes = 0xFFFFFFFFu;
 // How the candidates of a pair of meshes are tested.
 struct Rule {
   Accuracy accuracy;
-  bool separated;  // for a minimum separation above 0
+  bool separated;  // for a minimum separation above 0, or features that may have a thickness
   TestedFeatures features = {};
 
   // Number of the test; independent of which candidates exist.
@@ -50,8 +50,13 @@ class PairRules {
   }
   // The rule of an enabled pair.
   Rule rule(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
-    return one_rule_ ? *one_rule_ : rules_.of(mesh_a, mesh_b);
+    Rule rule = one_rule_ ? *one_rule_ : rules_.of(mesh_a, mesh_b);
+    rule.separated |= thick_;
+    return rule;
   }
+  // Whether features may have a thickness. Pairs without it are then tested as without a separation (Worker::test), so
+  // what follows from all rules remains.
+  void set_thick(bool thick) { thick_ = thick; }
   // Whether every contact has a time within 1e-12, so that pairs that cannot touch before a time can be skipped.
   bool promise_times() const { return promise_times_; }
   // Whether a tested pair has a tier whose results depend on the backend: "fast", without a separation.
@@ -67,7 +72,7 @@ class PairRules {
   PairTable<Rule> rules_;
   std::map<Rule, std::size_t> n_with_rule_;  // enabled pairs
   std::optional<Rule> one_rule_;             // of all of them
-  bool promise_times_ = true, any_fast_ = false;
+  bool promise_times_ = true, any_fast_ = false, thick_ = false;
 };
 
 }  // namespace hpccd

@@ -6,6 +6,7 @@
 #include "base/standard_arithmetic.h"
 #include "hpccd/hpccd.h"
 #include "scene/tested_features.h"
+#include "scene/thickness.h"
 
 namespace hpccd {
 
@@ -78,6 +79,13 @@ std::uint32_t Scene::add_mesh(std::string name, std::span<const std::uint32_t> f
   append(edges_, more_edges, edges, n_vertices_);
   n_vertices_ += n_vertices;
   return static_cast<std::uint32_t>(meshes_.size() - 1);
+}
+
+void Scene::set_thickness(std::uint32_t mesh, std::span<const double> thickness) {
+  const StandardArithmetic arithmetic;  // otherwise a negative denormal number might pass as 0
+  known(mesh, mesh);
+  check_thickness(meshes_[mesh], thickness);
+  meshes_[mesh].thickness.assign(thickness.begin(), thickness.end());
 }
 
 Scene::Pair Scene::known(std::uint32_t mesh_a, std::uint32_t mesh_b) const {

@@ -19,7 +19,7 @@ class Excess {
   // The excess is zero if all pairs have one separation, and if gaps of the scene are shortened (squeezed_axis.h): then
   // boxes have grown by less than their separation. The arguments must not change.
   Excess(const MotionBounds& motion, const SeparationTable& separations) {
-    if (!motion.grown || separations.uniform() || !motion.squeezed.empty()) return;
+    if (!motion.grown || separations.uniform() || !motion.squeezed.empty() || motion.thicker_than_scene()) return;
     motion_ = &motion, separations_ = separations.of_pairs();
   }
 

@@ -12,15 +12,18 @@
 #include "bvh/motion_bounds.h"
 #include "bvh/tree.h"
 #include "elementary/pair.h"
+#include "scene/thickness.h"
 #include "traverse/fine_boxes.h"
 #include "traverse/mesh_pairs.h"
 
 namespace hpccd {
 
 struct NearestPair {
+  // That of the surfaces, plus the largest thickness of both meshes: then bounds by boxes hold for each thickness.
   double distance = std::numeric_limits<double>::infinity();
   Kind kind = Kind::edge_face;
   std::uint32_t first = 0xFFFFFFFFu, second = 0xFFFFFFFFu;
+  double without_thickness = distance;
 
   // Order of results: edges and faces that intersect first, then by distance, then canonical order.
   bool before(const NearestPair& other) const;
@@ -29,16 +32,22 @@ struct NearestPair {
 class NearestPairs {
  public:
   // The arguments must outlive the object.
-  NearestPairs(const MeshPairs& pairs, const Features& features, const MotionBounds& motion, const Tree& tree);
+  NearestPairs(const MeshPairs& pairs, const Features& features, const MotionBounds& motion, const Tree& tree,
+               const ThicknessTable& thickness);
 
   // Features farther apart than this along an axis, in coordinates of the boxes, cannot improve the result.
   float reach(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     if (mesh_a == mixed_meshes || mesh_b == mixed_meshes) return std::numeric_limits<float>::infinity();
     return at(mesh_a, mesh_b).reach.load(std::memory_order_relaxed);
   }
-  // Vertex-face and edge-edge pairs beyond this distance cannot improve the result; below 0: no pair can.
+  // Pairs beyond this distance, plus their lack, cannot improve the result; below 0: no pair can.
   double limit(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     return at(mesh_a, mesh_b).limit.load(std::memory_order_relaxed);
+  }
+  // By how much the thickness of two features, their sum, is less than the largest of two features of their meshes.
+  double lack(std::uint32_t mesh_a, std::uint32_t mesh_b, double of_both) const {
+    const std::vector<double>& largest = thickness_.largest_of_meshes();
+    return largest.empty() ? 0 : largest[mesh_a] + largest[mesh_b] - of_both;
   }
   // Whether two nodes of the tree, by number, contain an edge that comes before the first one found to intersect a
   // face. With many intersections this ends the search early.
@@ -78,6 +87,7 @@ class NearestPairs {
   const Features& features_;
   const MotionBounds& motion_;
   const Tree& tree_;
+  const ThicknessTable& thickness_;
   std::unique_ptr<Entry[]> entries_;       // by number of the pair
   std::vector<std::uint32_t> least_edge_;  // by node
   std::unique_ptr<FineBoxes> fine_;

@@ -67,7 +67,7 @@ struct Search {
   virtual double limit_of(Kind kind, std::uint32_t first, std::uint32_t second) const {
     std::uint32_t v[4];
     pair_vertices(geometry, kind, first, second, v);
-    return geometry.separations.look_up(v[0], v[2]);
+    return geometry.separations.look_up(kind, first, second, v);
   }
   // A search that is worthwhile only for few results gives up above most_found. n_found: results so far.
   std::size_t most_found = std::numeric_limits<std::size_t>::max();
@@ -129,6 +129,8 @@ struct SnapshotSearch : Search {
 struct ProximitySearch final : SnapshotSearch {
   using SnapshotSearch::SnapshotSearch;
   const LeafPairsInSnapshot leaf_pairs = leaf_pairs_in_snapshot(simd);
+  // Distances of surfaces: less the thickness of both features.
+  bool take(Kind kind, const Contact& pair, std::vector<Contact>& list) override;
   void test_leaves(LeafPair pair, Worker& worker) const override;
 };
 

@@ -85,6 +85,14 @@ void SnapshotSearch::traverse(ThreadPool& pool, std::vector<Worker>& workers) {
   traverse_all(SnapshotBoxes{reach}, *this, pool, workers);
 }
 
+bool ProximitySearch::take(Kind kind, const Contact& pair, std::vector<Contact>& list) {
+  Contact surfaces = pair;
+  if (geometry.separations.thick())
+    surfaces.toc = std::min(pair.toc - geometry.separations.thickness_of(kind, pair.first, pair.second),
+                            geometry.separations.uniform);
+  return Search::take(kind, surfaces, list);
+}
+
 void ProximitySearch::test_leaves(LeafPair pair, Worker& worker) const {
   if (apart_by_hulls(tree, pair, reach, worker)) return;
   const Rule rule = rules.rule(tree.node_of_leaf(pair.first).mesh, tree.node_of_leaf(pair.second).mesh);
@@ -101,12 +109,14 @@ void IntersectionSearch::test_leaves(LeafPair pair, Worker& worker) const {
 
 bool DistanceSearch::take(Kind kind, const Contact& pair, std::vector<Contact>&) {
   const auto [a, b] = meshes_of(nearest, geometry, kind, pair.first, pair.second);
-  return nearest.offer(a, b, {pair.toc, kind, pair.first, pair.second});
+  const double lack = nearest.lack(a, b, geometry.separations.thickness_of(kind, pair.first, pair.second));
+  return nearest.offer(a, b,
+                       {pair.toc + (kind == Kind::edge_face ? 0 : lack), kind, pair.first, pair.second, pair.toc});
 }
 
 double DistanceSearch::limit_of(Kind kind, std::uint32_t first, std::uint32_t second) const {
   const auto [a, b] = meshes_of(nearest, geometry, kind, first, second);
-  return nearest.limit(a, b);
+  return nearest.limit(a, b) - nearest.lack(a, b, geometry.separations.thickness_of(kind, first, second));
 }
 
 void DistanceSearch::test_leaves(LeafPair pair, Worker& worker) const {

@@ -108,6 +108,39 @@ void Worker::keep(const std::uint32_t* first, const std::uint32_t* second, std::
 void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule) {
   heed_cancellation();
   if (kept) keep(first, second, n, kind, rule);
+  if (rule.separated && search_->geometry.separations.thick() && !search_->limits_fall)
+    test_thick(first, second, n, kind, rule);
+  else
+    test_batch(geometry_of(first, second, n, kind), first, second, n, kind, rule);
+}
+
+// Pairs with and without a separation, sorted: each has its own tests.
+void Worker::test_thick(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind,
+                        Rule rule) {
+  thick_.first.clear(), thick_.second.clear(), thin_.first.clear(), thin_.second.clear();
+  limits_.clear();
+  for (std::uint32_t i = 0; i < n; ++i) {
+    std::uint32_t v[4];
+    pair_vertices(search_->geometry, kind, first[i], second[i], v);
+    const double limit = search_->geometry.separations.look_up(kind, first[i], second[i], v);
+    if (limit > 0) limits_.push_back(limit);
+    Sorted& sorted = limit > 0 ? thick_ : thin_;
+    sorted.first.push_back(first[i]), sorted.second.push_back(second[i]);
+  }
+  limited_ = search_->geometry;
+  if (const float until = search_->until(); until < 1) limited_.until = until;
+  limited_.separations.of_candidates = limits_.data();
+  const auto test = [&](const Sorted& pairs, bool separated) {
+    const auto size = static_cast<std::uint32_t>(pairs.first.size());
+    if (size > 0)
+      test_batch(limited_, pairs.first.data(), pairs.second.data(), size, kind,
+                 {rule.accuracy, separated, rule.features});
+  };
+  test(thick_, true), test(thin_, false);
+}
+
+void Worker::test_batch(const Geometry& geometry, const std::uint32_t* first, const std::uint32_t* second,
+                        std::uint32_t n, Kind kind, Rule rule) {
   std::vector<Contact>& list = found(kind);
   if (list.capacity() - list.size() < n && list.size() >= many) grow(list, *search_->cancellation);
   BatchResult& r = *result_;
@@ -118,7 +151,7 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
     std::fill_n(r.toc, r.n_contacts, 0.0);
     std::fill_n(r.delta, r.n_contacts, 0.0);
   } else {
-    search_->batch_test[rule.number()](geometry_of(first, second, n, kind), kind, first, second, n, r);
+    search_->batch_test[rule.number()](geometry, kind, first, second, n, r);
   }
   count = r.counts;
   const bool rounds_down = search_->time_only && rule.accuracy == Accuracy::exact;

@@ -98,6 +98,9 @@ class alignas(128) Worker {
   void drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t keep_below);
   void keep(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule);
   void test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule);
+  void test_thick(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule);
+  void test_batch(const Geometry& geometry, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
+                  Kind kind, Rule rule);
   const Geometry& geometry_of(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind);
   std::vector<Contact>& found(Kind kind);
   Geometry limited_;
@@ -113,6 +116,10 @@ class alignas(128) Worker {
   std::uint32_t growing_batch_ = first_batch;
   bool nearer_ = false, boxes_leave_much_ = false;
   std::vector<double> limits_;  // of the candidates of a batch, unless they are in a table
+  struct Sorted {
+    std::vector<std::uint32_t> first, second;
+  };
+  Sorted thick_, thin_;  // the pairs of a batch
 };
 
 }  // namespace hpccd

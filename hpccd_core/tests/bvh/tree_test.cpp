@@ -110,7 +110,8 @@ TEST_F(TreeTest, RefitToTheSameMotionChangesNothing) {
 struct RowsTest : TreeTest {
   void update_with(double separation, double t0, double t1) {
     const auto start = test::sheet_positions(n, t0, lone), end = test::sheet_positions(n, t1, lone);
-    motion.update(*scene, test::view(start), test::view(end), std::vector<double>(2, separation), pool);
+    const std::vector<double> separations(2, separation);
+    motion.update(*scene, test::view(start), test::view(end), Growth{separations}, pool);
   }
   void update_snapshot(double t) { motion.update(*scene, test::view(test::sheet_positions(n, t, lone)), pool); }
 

@@ -98,7 +98,8 @@ struct Nothing {
   MeshPairs pairs{PairRules(*scene, Accuracy::exact, SeparationTable(*scene, 0)), scene->meshes().size()};
   MotionBounds motion;
   Tree tree;
-  NearestPairs nearest{pairs, features, motion, tree};
+  ThicknessTable thickness{*scene, features};
+  NearestPairs nearest{pairs, features, motion, tree, thickness};
   Cancellation cancellation;
 
   std::vector<Gap> gaps() const { return collect_gaps(nearest, {}, cancellation); }

@@ -30,7 +30,7 @@ struct Bench {
 
   void update(double from, double to) {
     start = test::sheet_positions(side, from), end = test::sheet_positions(side, to);
-    motion.update(*scene, test::view(start), test::view(end), separations.largest(), pool);
+    motion.update(*scene, test::view(start), test::view(end), Growth{separations.largest()}, pool);
     build(tree, *scene, features, motion, pool);
     search.geometry = {motion.vertices.data(), features.edges.data(), features.faces.data(), nullptr};
     search.geometry.separations = {separations.first()};

@@ -57,7 +57,7 @@ struct LeafPairsTest : testing::TestWithParam<Case> {
     first = soup ? test::soup_positions(triangles, 1) : test::sheet_positions(side, 0, lone);
     last = soup ? test::soup_positions(triangles, 2) : test::sheet_positions(side, 1, lone);
     const std::vector<double> separations(2, GetParam().separation);
-    motion.update(*scene, test::view(first), test::view(last), separations, pool);
+    motion.update(*scene, test::view(first), test::view(last), Growth{separations}, pool);
     build(tree, *scene, features, motion, pool);
   }
 
@@ -246,7 +246,8 @@ TEST_P(BlockPairsTest, AreTheLeavesThatOverlapByMoreThanTheExcess) {
 TEST_P(BlockPairsTest, AreThoseOfTheLastBounds) {
   for (const double separation : {0.4, 0.0, 0.2, 0.1, 0.0}) {
     for (auto* end : {&last, &first}) {
-      motion.update(*scene, test::view(first), test::view(*end), std::vector<double>(2, separation), pool);
+      const std::vector<double> separations(2, separation);
+      motion.update(*scene, test::view(first), test::view(*end), Growth{separations}, pool);
       refit(tree, motion, {}, pool);
       ASSERT_NO_FATAL_FAILURE(expect_leaves_that_overlap());
     }
