@@ -32,11 +32,12 @@ class Proximity(WithSides, PairsOfWorlds):
     vf : ndarray, shape (N, 2), uint32
         Vertex and face, scene-wide indices, sorted lexicographically.
     vf_distance : ndarray, shape (N,), float64
-        Euclidean distance of each row of `vf`, in the unit of the coordinates.
+        Euclidean distance of each row of `vf`, in the unit of the coordinates, minus the thickness of both features:
+        negative where thick surfaces overlap.
     ee : ndarray, shape (M, 4), uint32
         Vertices a0 a1 b0 b1 of two edges, ordered as in Contacts.
     ee_distance : ndarray, shape (M,), float64
-        Euclidean distance of each row of `ee`.
+        The same of each row of `ee`.
     hash : int
         64-bit; the same for the same pairs and distances on any backend and with any number of threads.
     outputs : dict of str to ndarray
@@ -320,7 +321,8 @@ class Gap(ComparedByRows):
         Names; `mesh_a` was added before `mesh_b`, or is the same.
     distance : float
         Euclidean, of the surfaces, in the unit of the coordinates; 0 if they touch or intersect, +inf if no pair of
-        features exists.
+        features exists. With thickness minus that of both features: negative where thick surfaces overlap. For
+        "edge-face" then minus the thickness of the edge and face in `features`.
     kind : str
         "vertex-face", "edge-edge", "edge-face" (they intersect) or "" (no pair exists).
     features : tuple of int

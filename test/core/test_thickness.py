@@ -115,15 +115,24 @@ def test_contacts(make, base):
 
 
 @SCENES
-def test_proximity_and_distances(make):
+@pytest.mark.parametrize("distance", [0.0, 0.375])
+def test_proximity(make, distance):
     given = thick(make)
     m = given.meshes
-    vertices, distance = m.vertices_t1, 0.375
+    vertices = m.vertices_t1
     found = given.detector().proximity(vertices, distance)
     truth = given.truth(lambda d: oracle.proximity(vertices, d, m.faces, **m.beside_faces), distance)
     for kind, own in (("vf", given.of_vf), ("ee", given.of_ee)):
         surfaces = {row: value - own(list(row)) for row, value in truth[kind].items()}
         assert_rows(getattr(found, kind), getattr(found, f"{kind}_distance"), surfaces, 1e-9 * np.abs(vertices).max())
+    assert given.detector(threads=2).proximity(vertices, distance) == found
+
+
+@SCENES
+def test_distances(make):
+    given = thick(make)
+    m = given.meshes
+    vertices = m.vertices_t1
     # The smallest distance is that of the nearest of all pairs, unless centre surfaces intersect.
     centres = {(g.mesh_a, g.mesh_b): g for g in hc.Detector(m.scene(), backend="cpu").distances(vertices)}
     everything = given.detector().proximity(vertices, 4.0)

@@ -126,7 +126,9 @@ enum class Inside : std::uint8_t { none, a, b, both };
 struct Gap {
   std::uint32_t mesh_a;  ///< number of the first mesh
   std::uint32_t mesh_b;  ///< number of the second mesh, >= mesh_a
-  /// Of the surfaces, also if one mesh lies inside the other; 0 for edge_face, infinite for none.
+  /// Of the surfaces, also if one mesh lies inside the other; infinite for none. With thickness the distance of the
+  /// centre surfaces minus that of both features, so negative where thick surfaces overlap. For edge_face 0 minus the
+  /// thickness of the edge and face in `features`.
   double distance = std::numeric_limits<double>::infinity();
   GapKind kind = GapKind::none;                   ///< kind of the closest pair of features
   std::array<std::uint32_t, 4> features{};        ///< as in vf, ee or ef, then zeros

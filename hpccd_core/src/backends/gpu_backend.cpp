@@ -98,7 +98,8 @@ std::optional<DeviceResults> GpuBackend::detect_on_device(Positions t0, Position
 std::optional<DeviceResults> GpuBackend::proximity_on_device(Positions vertices, double distance) {
   return attempt([&] {
     run_near_pairs(vertices, distance);
-    return with_places(finish_on_device(), Outputs::of_proximity(shared_.options), {distance}, vertices, vertices);
+    return with_places(finish_on_device(), Outputs::of_proximity(shared_.options), within(distance), vertices,
+                       vertices);
   });
 }
 
@@ -133,8 +134,8 @@ void GpuBackend::each_world(Function&& f) const {
 }
 
 void GpuBackend::prepare_motion(Positions t0, Positions t1, bool until_best) {
-  const SeparationTable& table = shared_.separations;
-  prepare({table.any() ? gpu::Query::separations : gpu::Query::contacts, growth_of(table.most()), until_best},
+  const gpu::Query query = shared_.common.any_separation() ? gpu::Query::separations : gpu::Query::contacts;
+  prepare({query, growth_of(shared_.most_separation()), until_best},
           [&] { shared_.tree.bound(on_host(of_world(t0, 0), 0), on_host(of_world(t1, 0), 1), {}); });
 }
 
@@ -183,21 +184,32 @@ Contacts GpuBackend::contacts(Positions t0, Positions t1) {
   return found;
 }
 
+// Limits of a proximity query.
+Separations GpuBackend::within(double distance) const {
+  Separations separations{distance};
+  separations.thickness = shared_.common.thickness.view();
+  return separations;
+}
+
 void GpuBackend::run_near_pairs(Positions vertices, double distance) {
   run_snapshot(gpu::Query::proximity, vertices, distance);
   if (!pipeline_->undecided().empty()) vertices = on_host(vertices, 0);
-  const Separations separations{distance};
+  const Separations separations = within(distance);
   decide([&](const Candidate& u) {
     const UndecidedPair pair = undecided(separations, u, vertices, vertices);
     FallbackCounts counts;
-    return decide_proximity(accuracy_of(u), pair, counts);
+    std::optional<double> found = decide_proximity(accuracy_of(u), pair, counts);
+    const Candidate own = in_its_world(u);
+    if (found && separations.thick())
+      found = std::min(*found - separations.thickness_of(own.kind, own.first, own.second), distance);
+    return found;
   });
 }
 
 Contacts GpuBackend::near_pairs(Positions vertices, double distance) {
   run_near_pairs(vertices, distance);
   Contacts found = finish_on_host(Report::all);
-  add_places(found, Outputs::of_proximity(shared_.options), {distance}, vertices, vertices);
+  add_places(found, Outputs::of_proximity(shared_.options), within(distance), vertices, vertices);
   shared_.profiler.mark("contacts");
   return found;
 }
@@ -293,7 +305,7 @@ template <class Bound>
 void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
   if (!pipeline_) {
     pipeline_ = gpu::Pipeline::create(*shared_.scene, shared_.features, shared_.options, shared_.separations,
-                                      gpu::status().devices.at(0).number);
+                                      shared_.common.thickness, gpu::status().devices.at(0).number);
     shared_.profiler.mark("gpu_start");
   }
   const bool worn = has_tree_ && worn_out_on_device();
@@ -375,7 +387,7 @@ double GpuBackend::earliest_time(Positions t0, Positions t1) {
   const bool prunes = shared_.rules.promise_times();
   prepare_motion(t0, t1, prunes);
   if (!prunes) return run_for_earliest(t0, t1, Pairs::all, std::nullopt);
-  if (const std::uint64_t now = shared_.separations.version(); near_.separations != now)
+  if (const std::uint64_t now = shared_.common.version_of_separations(); near_.separations != now)
     near_.forget(), near_.separations = now;
   constexpr double none = std::numeric_limits<double>::infinity();
   double time = none;
@@ -420,7 +432,7 @@ double GpuBackend::run_for_earliest(Positions t0, Positions t1, Pairs pairs, gpu
 bool GpuBackend::list_near_pairs(Positions t0, double time, const Travel& travel) {
   if (!near_.next_would_pay(travel)) return false;
   const std::optional<double> radius = near_.next(travel, time);
-  const std::optional<double> distance = listed_distance(radius, shared_.separations.most());
+  const std::optional<double> distance = listed_distance(radius, shared_.most_separation());
   if (!distance) return false;
   prepare_snapshot(gpu::Query::proximity, t0, *distance);
   require_good(pipeline_->list_near(t0, *distance, most_listed(shared_.features), shared_.pool), t0, t0);
@@ -576,7 +588,7 @@ GpuBackend::Prepared GpuBackend::prepare(Positions t0, Positions t1, double room
   options.gpu_stages = false;  // unused, and events would accumulate
   Prepared p;
   p.pipeline = gpu::Pipeline::create(*shared_.scene, shared_.features, options, shared_.separations,
-                                     gpu::status().devices.at(0).number);
+                                     shared_.common.thickness, gpu::status().devices.at(0).number);
   shared_.tree.bound(on_host(of_world(t0, 0), 0), on_host(of_world(t1, 0), 1), {});
   shared_.tree.build_anew();
   p.pipeline->set_tree(shared_.tree.tree());

@@ -74,6 +74,7 @@ class GpuBackend final : public DetectionBackend {
   void each_world(Function&& f) const;
   std::size_t world_of(const Candidate& pair) const;
   Candidate in_its_world(Candidate pair) const;
+  Separations within(double distance) const;
   UndecidedPair undecided(const Separations& separations, const Candidate& pair, Positions t0, Positions t1) const;
   void require_rest(Positions t0, Positions t1) const;
   void run_contacts(Positions t0, Positions t1);

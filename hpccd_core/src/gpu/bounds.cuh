@@ -138,9 +138,11 @@ __global__ void vertices_kernel(LaunchParams<T> params) {
     point.at[0].x[k] = map(a[k], k);
     point.at[1].x[k] = part < 1 ? place_at(part, map.precise(a[k], k), map.precise(b[k], k)) : map(b[k], k);
   }
-  const double separation = params.largest_separation
-                                ? params.largest_separation[params.mesh_of_vertex[i - world * params.n_vertices]]
-                                : params.separation;
+  const u32 own = i - world * params.n_vertices;
+  const double thickness = params.thickness.of_vertex ? params.thickness.of_vertex[own] : 0;
+  const double separation =
+      (params.largest_separation ? params.largest_separation[params.mesh_of_vertex[own]] : params.separation) +
+      2 * thickness;
   const float reach = reach_on_device(separation, map.scale, largest);
   point.at[0].tag = __float_as_uint(reach);
   point.at[1].tag = __float_as_uint(part < 1 ? reach + lost_by_place : reach);

@@ -50,14 +50,16 @@ __device__ __forceinline__ auto load_for_filter(const LaunchParams<T>& params, u
 
 // Whether a pair passes the first filter. One piece of code for both kinds, which differ in the start of b.
 template <Query query, class Policy, class T>
-__device__ __forceinline__ bool passes_filter(const LaunchParams<T>& params, uint4 v, bool edges) {
+__device__ __forceinline__ bool passes_filter(const LaunchParams<T>& params, uint4 v, uint2 features, bool edges) {
   const auto from = load_for_filter<Policy>(params, v.x), p = load_for_filter<Policy>(params, v.y),
              a = load_for_filter<Policy>(params, v.z), b = load_for_filter<Policy>(params, v.w);
   using R = decltype(from.t0.x);
   const Vec3<R> b_from0 = edges ? p.t0 : from.t0, b_from1 = edges ? p.t1 : from.t1;
   const Motion<R> m{p.t0 - from.t0, a.t0 - from.t0, b.t0 - b_from0, p.t1 - from.t1, a.t1 - from.t1, b.t1 - b_from1};
   // Without a separation both tests are bit-identical.
-  if constexpr (query == Query::separations) return !planes_stay_apart(m, separation_of(params, v.x, v.y));
+  if constexpr (query == Query::separations)
+    return !planes_stay_apart(m,
+                              separation_of(params, edges ? Kind::edge_edge : Kind::vertex_face, features, v.x, v.y));
   return !coplanarity_filter<Policy>(m).none;
 }
 
@@ -74,7 +76,7 @@ __device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params,
     features = s.features[state.n + lane];
     edges = features.y & kind_bit;
     features.y &= ~kind_bit;
-    survives = of_snapshot(query) || passes_filter<query, Policy>(params, s.vertices[state.n + lane], edges);
+    survives = of_snapshot(query) || passes_filter<query, Policy>(params, s.vertices[state.n + lane], features, edges);
   }
 #pragma unroll
   for (u32 kind = 0; kind < 2; ++kind) {

@@ -13,6 +13,7 @@
 #include "scene/scene_pairs.h"
 #include "scene/separation_table.h"
 #include "scene/tested_pairs.h"
+#include "scene/thickness.h"
 
 namespace hpccd::gpu {
 
@@ -20,8 +21,8 @@ class DeviceScene {
  public:
   // On the current device. Throws Error if the scene has too many features for 31-bit numbers.
   DeviceScene(const Scene& scene, const Features& features, Accuracy accuracy, TestedFeatures tested,
-              const SeparationTable& separations, u32 n_worlds)
-      : features_(features), separations_(separations), n_worlds_(n_worlds) {
+              const SeparationTable& separations, const ThicknessTable& thickness, u32 n_worlds)
+      : features_(features), separations_(separations), thickness_(thickness), n_worlds_(n_worlds) {
     const auto n_edges = features.edges.size();
     if (std::max<std::size_t>({features.n_vertices, n_edges, features.n_faces()}) * n_worlds >= kind_bit)
       throw Error("the scene has 2^31 or more features of one kind in all worlds; use backend=\"cpu\"");
@@ -56,8 +57,10 @@ class DeviceScene {
   bool all_fast() const { return all_fast_; }  // all pairs that are tested
   // Copies the separations to the device if they have changed; must be called before a frame of motions.
   void update_separations() {
-    any_separation_ = separations_.any(), one_separation_ = separations_.uniform();
+    any_separation_ = separations_.any() || thickness_.any(), one_separation_ = separations_.uniform();
     separation_ = any_separation_ && one_separation_ ? separations_.first() : 0;
+    by_mesh_ = separations_.any(), thick_ = thickness_.any();
+    update_thickness();
     if (!separations_.any() || separations_.version() == uploaded_) return;
     uploaded_ = 0;  // invalid, if this fails
     if (!one_separation_) {
@@ -73,15 +76,22 @@ class DeviceScene {
     const bool any = query_now() == Query::separations;
     params.separation = separation_;
     params.separations = any && !one_separation_ ? pair_separation_.data() : nullptr;
-    params.largest_separation = any ? largest_separation_.data() : nullptr;
+    params.largest_separation = by_mesh_ ? largest_separation_.data() : nullptr;
+    fill_thickness(params);
+  }
+  // As at the last update_separations().
+  template <class T>
+  void fill_thickness(LaunchParams<T>& params) const {
+    if (thick_) params.thickness = {vertex_thickness_.data(), edge_thickness_.data(), face_thickness_.data()};
   }
   // Changes with every value that fill_separations writes.
-  u64 separations_version() const { return separations_.version(); }
+  u64 separations_version() const { return separations_.version() + thickness_.version(); }
 
   const PairKeys& keys() const { return keys_; }
   std::size_t bytes() const {
     return edges_.bytes() + faces_.bytes() + mesh_of_vertex_.bytes() + enabled_.bytes() + accuracy_.bytes() +
-           tested_.bytes() + pair_separation_.bytes() + largest_separation_.bytes();
+           tested_.bytes() + pair_separation_.bytes() + largest_separation_.bytes() + vertex_thickness_.bytes() +
+           edge_thickness_.bytes() + face_thickness_.bytes();
   }
 
  private:
@@ -95,6 +105,16 @@ class DeviceScene {
   }
   void upload_pairs(DeviceBuffer<unsigned char>& to, const std::vector<unsigned char>& all) {
     upload(to, all.data(), all.size());
+  }
+
+  void update_thickness() {
+    if (!thickness_.any() || thickness_.version() == uploaded_thickness_) return;
+    uploaded_thickness_ = 0;
+    const Thicknesses now = thickness_.view();
+    upload(vertex_thickness_, now.of_vertex, features_.n_vertices);
+    upload(edge_thickness_, now.of_edge, features_.edges.size());
+    upload(face_thickness_, now.of_face, features_.n_faces());
+    uploaded_thickness_ = thickness_.version();
   }
 
   void upload_rules(const Scene& scene, Accuracy accuracy) {
@@ -132,15 +152,17 @@ class DeviceScene {
 
   const Features& features_;
   const SeparationTable& separations_;
+  const ThicknessTable& thickness_;
   const u32 n_worlds_;
-  std::uint64_t uploaded_ = 0;  // version of the separations on the device
+  std::uint64_t uploaded_ = 0, uploaded_thickness_ = 0;  // versions on the device
   // At the last update: a prepared detection keeps these values after a later change.
-  bool any_separation_ = false, one_separation_ = true;
+  bool any_separation_ = false, one_separation_ = true, by_mesh_ = false, thick_ = false;
   double separation_ = 0;
   DeviceBuffer<uint2> edges_;
   DeviceBuffer<u32> faces_, mesh_of_vertex_;
   DeviceBuffer<unsigned char> enabled_, accuracy_, tested_;
   DeviceBuffer<double> pair_separation_, largest_separation_;
+  DeviceBuffer<double> vertex_thickness_, edge_thickness_, face_thickness_;
   bool all_enabled_ = true, one_accuracy_ = true, all_fast_ = true, one_tested_ = true;
   unsigned char default_tested_ = 0;
   u32 n_meshes_ = 0;

@@ -82,9 +82,10 @@ __global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ La
     double separation = 0;
     if (i < n) {
       key = params.undecided[i];
-      const Kind kind = params.keys.pair_of(key).kind;
-      const uint4 v = vertices_of(params, params.keys.pair_of(key));
-      if constexpr (separations) separation = separation_of(params, v.x, v.z);
+      const Candidate pair = params.keys.pair_of(key);
+      const Kind kind = pair.kind;
+      const uint4 v = vertices_of(params, pair);
+      if constexpr (separations) separation = separation_of(params, kind, {pair.first, pair.second}, v.x, v.z);
       answer = kind == Kind::edge_edge ? fallback<Kind::edge_edge>(params, v, separation)
                                        : fallback<Kind::vertex_face>(params, v, separation);
     }

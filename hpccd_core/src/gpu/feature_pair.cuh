@@ -100,6 +100,22 @@ __device__ inline double separation_of(const LaunchParams<T>& params, u32 first,
   return params.separations[mesh_of(params, first) * params.n_meshes + mesh_of(params, second)];
 }
 
+// The thickness of both features, by number: the first one through all worlds.
+template <class T>
+__device__ inline double thickness_of(const LaunchParams<T>& params, Kind kind, u32 first, u32 second) {
+  const Thicknesses& t = params.thickness;
+  if (!t.of_vertex) return 0;
+  const u32 world = world_of(params, kind, first);
+  return kind == Kind::edge_edge ? t.of_edge[first - world * params.n_edges] + t.of_edge[second]
+                                 : t.of_vertex[first - world * params.n_vertices] + t.of_face[second];
+}
+
+// The same with their thickness: Separations::look_up on the device.
+template <class T>
+__device__ inline double separation_of(const LaunchParams<T>& params, Kind kind, uint2 pair, u32 first, u32 second) {
+  return separation_of(params, first, second) + thickness_of(params, kind, pair.x, pair.y);
+}
+
 // Both ends of a pair, in the order of pair_vertices, for tests that need more than its spanning vectors.
 struct PairEnds {
   Vec3<double> t0[4], t1[4];

@@ -29,7 +29,7 @@ __device__ double time_of(const LaunchParams<T>& params, uint2 pair) {
   const uint4 v = vertices_of<kind>(params, pair.x, pair.y);
   const PairEnds q = given_ends(params, v);
   const Motion<double> m = motion_of<kind>(q.t0, q.t1);
-  const double separation = query == Query::separations ? separation_of(params, v.x, v.z) : 0;
+  const double separation = query == Query::separations ? separation_of(params, kind, pair, v.x, v.z) : 0;
   Outcome<double> o{};
   if (query == Query::separations && separation > 0) {
     o = separation_filter<kind>(m, separation);

@@ -94,6 +94,7 @@ struct LaunchParams {
   double separation;                 // if there is no table
   const double* separations;         // n_meshes^2
   const double* largest_separation;  // of each mesh, if there is a table
+  Thicknesses thickness;
 
   // The tree: topology, and the boxes of each world in this frame.
   u32 n_nodes, n_leaves;

@@ -29,12 +29,12 @@ double as_time(u64 soonest) { return soonest ? std::bit_cast<double>(~soonest) :
 class DevicePipeline : public Pipeline {
  public:
   DevicePipeline(const Scene& scene, const Features& features, const Options& options,
-                 const SeparationTable& separations, int device)
+                 const SeparationTable& separations, const ThicknessTable& thickness, int device)
       : device_((check(cudaSetDevice(device), "cudaSetDevice"), device)),
         options_(options),
         timer_(options.gpu_stages),
         features_(features),
-        scene_(scene, features, options.accuracy, options.features, separations, options.worlds),
+        scene_(scene, features, options.accuracy, options.features, separations, thickness, options.worlds),
         tree_(options.worlds),
         positions_(device),
         lists_(16 * typical_size(), 4 * typical_size(), typical_size() / 2),
@@ -70,6 +70,7 @@ class DevicePipeline : public Pipeline {
   }
   bool run_snapshot(Query query, Positions vertices, double distance, ThreadPool& pool) override {
     begin();
+    scene_.update_separations();
     return run_frame(query, vertices, vertices, distance, pool);
   }
   std::optional<std::vector<PointOnFace>> locate_points(Positions vertices, Positions points, u32 mesh,
@@ -286,10 +287,10 @@ LaunchParams<T> DevicePipeline::frame_params(double distance, const T* given_t0,
   params.fast = is_fast();
   params.time_only = for_earliest();
   params.until_best = best_.has_value(), params.best = best_.value_or(no_time);
-  if (of_snapshot(query_))
-    params.separation = distance;
-  else
-    scene_.fill_separations(params);
+  if (!of_snapshot(query_)) scene_.fill_separations(params);
+  if (of_snapshot(query_)) params.separation = distance;
+  // A list of near pairs is by the distance of centre surfaces.
+  if (query_ == Query::proximity && goal_ != Goal::near_list) scene_.fill_thickness(params);
   params.integers_on_device = true;
   params.wanted = wanted();
   params.largest = of_snapshot(query_) ? largest_in_snapshot : largest_coordinate;
@@ -607,9 +608,10 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
 }  // namespace
 
 std::unique_ptr<Pipeline> Pipeline::create(const Scene& scene, const Features& features, const Options& options,
-                                           const SeparationTable& separations, int device) {
+                                           const SeparationTable& separations, const ThicknessTable& thickness,
+                                           int device) {
   if (status().devices.empty()) throw Error(status().reason);
-  return std::make_unique<DevicePipeline>(scene, features, options, separations, device);
+  return std::make_unique<DevicePipeline>(scene, features, options, separations, thickness, device);
 }
 
 }  // namespace hpccd::gpu

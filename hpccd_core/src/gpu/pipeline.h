@@ -22,6 +22,7 @@
 #include "hpccd/prepared.h"
 #include "scene/features.h"
 #include "scene/separation_table.h"
+#include "scene/thickness.h"
 
 namespace hpccd::gpu {
 
@@ -66,7 +67,8 @@ class Pipeline {
   // Throws Error if the device has not enough memory, or if the scene has too many features for 31-bit numbers.
   // Separations may change between frames.
   static std::unique_ptr<Pipeline> create(const Scene& scene, const Features& features, const Options& options,
-                                          const SeparationTable& separations, int device);
+                                          const SeparationTable& separations, const ThicknessTable& thickness,
+                                          int device);
   virtual ~Pipeline() = default;
 
   // Sets the tree whose boxes are refitted in every frame.

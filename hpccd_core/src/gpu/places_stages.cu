@@ -35,6 +35,29 @@ __device__ uint4 vertices_of_row(const LaunchParams<T>& params, const PlacesTask
   return {v.x + base, v.y + base, v.z + base, v.w + base};
 }
 
+// The edge with these vertices of its world. Edges are in lexicographic order.
+template <class T>
+__device__ u32 edge_number(const LaunchParams<T>& params, u32 a, u32 b) {
+  u32 begin = 0, end = params.n_edges;
+  while (begin + 1 < end) {
+    const u32 middle = begin + (end - begin) / 2;
+    const uint2 e = params.edges[middle];
+    (e.x < a || (e.x == a && e.y <= b) ? begin : end) = middle;
+  }
+  return begin;
+}
+
+template <class T>
+__device__ double separation_of_row(const LaunchParams<T>& params, const PlacesTask& task, u64 row, uint4 v, u32 base) {
+  const double of_meshes = separation_of(params, v.x, v.z);
+  if (!params.thickness.of_vertex) return of_meshes;
+  if (row < task.n_rows[0]) return of_meshes + thickness_of(params, Kind::vertex_face, v.x, task.vf[row].y);
+  const u32 world = base / params.n_vertices;
+  return of_meshes + thickness_of(params, Kind::edge_edge,
+                                  world * params.n_edges + edge_number(params, v.x - base, v.y - base),
+                                  edge_number(params, v.z - base, v.w - base));
+}
+
 template <class T>
 __global__ __launch_bounds__(128) void places_kernel(const __grid_constant__ LaunchParams<T> params,
                                                      const __grid_constant__ PlacesTask task) {
@@ -45,7 +68,7 @@ __global__ __launch_bounds__(128) void places_kernel(const __grid_constant__ Lau
     if (task.out.outputs.weights) task.out.vertices[i] = {v.x - base, v.y - base, v.z - base, v.w - base};
     const PairEnds q = load_pair_ends(params.vertices, v);
     OpenRow row;
-    row.row = i, row.toc = task.tocs[i], row.separation = separation_of(params, v.x, v.z);
+    row.row = i, row.toc = task.tocs[i], row.separation = separation_of_row(params, task, i, v, base);
     for (int k = 0; k < 4; ++k) row.t0[k] = q.t0[k], row.t1[k] = q.t1[k];
     if (find_places<LeftOpen>(task, row)) continue;
     // Each lane separately: a warp may have diverged here (item_of_thread.cuh).

@@ -17,7 +17,7 @@ __global__ __launch_bounds__(128) void separation_filter_kernel(const __grid_con
     RootTests without{false, false};
     if (valid) {
       const uint4 v = vertices_of<kind>(params, pair.x, pair.y);
-      const double d = separation_of(params, v.x, v.z);
+      const double d = separation_of(params, kind, pair, v.x, v.z);
       if (d > 0) {
         const Outcome<double> o = separation_filter<kind>(load_motion<kind>(params.vertices, v), d);
         within = o.contact;
@@ -47,7 +47,7 @@ __global__ __launch_bounds__(128) void separation_kernel(const __grid_constant__
     if (valid) {
       const uint4 v = vertices_of<kind>(params, pair.x, pair.y);
       const Outcome<double> o =
-          separation_test<kind>(load_motion<kind>(params.vertices, v), separation_of(params, v.x, v.z));
+          separation_test<kind>(load_motion<kind>(params.vertices, v), separation_of(params, kind, pair, v.x, v.z));
       contact = o.contact;
       undecided = !o.contact && !o.none;
       toc = reported_time(reported_as(params, v), o.toc, o.delta);

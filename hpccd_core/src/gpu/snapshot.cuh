@@ -98,11 +98,13 @@ __device__ __forceinline__ void test_proximity(const LaunchParams<T>& params, Fo
     bool near = false, undecided = false;
     double distance = 0;
     if (valid) {
-      const NearOrFar<double> o = proximity_test<kind>(snapshot_of<kind>(given), params.separation);
+      const double thickness = thickness_of(params, kind, pair.x, pair.y);
+      const NearOrFar<double> o = proximity_test<kind>(snapshot_of<kind>(given), params.separation + thickness);
       const bool touch = !o.near && !o.far && certainly_touch<kind>(params, numbers(pair));
       near = o.near || touch;
       undecided = !near && !o.far;
       distance = touch ? 0 : o.distance;
+      if (params.thickness.of_vertex) distance = lesser(distance - thickness, params.separation);
       n_far += o.far;
     }
     load_next();

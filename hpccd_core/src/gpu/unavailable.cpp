@@ -24,7 +24,8 @@ void fail_after(int) {}
 
 void download(const void*, void*, std::size_t) { throw Error(status().reason); }
 
-std::unique_ptr<Pipeline> Pipeline::create(const Scene&, const Features&, const Options&, const SeparationTable&, int) {
+std::unique_ptr<Pipeline> Pipeline::create(const Scene&, const Features&, const Options&, const SeparationTable&,
+                                           const ThicknessTable&, int) {
   throw Error(status().reason);
 }
 

@@ -8,6 +8,7 @@
 #include "hybrid/test_device.h"
 #include "scene/features.h"
 #include "scene/separation_table.h"
+#include "scene/thickness.h"
 
 namespace hpccd::hybrid {
 
@@ -15,6 +16,6 @@ namespace hpccd::hybrid {
 // frames. Throws gpu::Error if there are none, or too little memory.
 std::vector<std::unique_ptr<TestDevice>> cuda_devices(const Scene& scene, const Features& features, Accuracy accuracy,
                                                       TestedFeatures tested, const SeparationTable& separations,
-                                                      int gpus);
+                                                      const ThicknessTable& thickness, int gpus);
 
 }  // namespace hpccd::hybrid

@@ -6,7 +6,7 @@
 namespace hpccd::hybrid {
 
 std::vector<std::unique_ptr<TestDevice>> cuda_devices(const Scene&, const Features&, Accuracy, TestedFeatures,
-                                                      const SeparationTable&, int) {
+                                                      const SeparationTable&, const ThicknessTable&, int) {
   throw gpu::Error(gpu::status().reason);
 }
 

@@ -114,29 +114,34 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
     test_batch(geometry_of(first, second, n, kind), first, second, n, kind, rule);
 }
 
-// Pairs with and without a separation, sorted: each has its own tests.
+// Pairs without a separation have their own tests.
 void Worker::test_thick(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind,
                         Rule rule) {
-  thick_.first.clear(), thick_.second.clear(), thin_.first.clear(), thin_.second.clear();
-  limits_.clear();
+  const Separations& separations = search_->geometry.separations;
+  const bool by_meshes = separations.mesh_of_vertex;
+  limits_.resize(batch_capacity);
+  std::uint32_t n_thick = 0;
   for (std::uint32_t i = 0; i < n; ++i) {
-    std::uint32_t v[4];
-    pair_vertices(search_->geometry, kind, first[i], second[i], v);
-    const double limit = search_->geometry.separations.look_up(kind, first[i], second[i], v);
-    if (limit > 0) limits_.push_back(limit);
-    Sorted& sorted = limit > 0 ? thick_ : thin_;
-    sorted.first.push_back(first[i]), sorted.second.push_back(second[i]);
+    std::uint32_t v[4] = {};
+    if (by_meshes) pair_vertices(search_->geometry, kind, first[i], second[i], v);
+    limits_[i] = separations.look_up(kind, first[i], second[i], v);
+    n_thick += limits_[i] > 0;
   }
   limited_ = search_->geometry;
   if (const float until = search_->until(); until < 1) limited_.until = until;
   limited_.separations.of_candidates = limits_.data();
-  const auto test = [&](const Sorted& pairs, bool separated) {
-    const auto size = static_cast<std::uint32_t>(pairs.first.size());
-    if (size > 0)
-      test_batch(limited_, pairs.first.data(), pairs.second.data(), size, kind,
-                 {rule.accuracy, separated, rule.features});
-  };
-  test(thick_, true), test(thin_, false);
+  if (n_thick == n) return test_batch(limited_, first, second, n, kind, rule);
+  first_.resize(batch_capacity), second_.resize(batch_capacity);
+  std::uint32_t thick = 0, thin = n_thick;  // thick pairs first
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t to = limits_[i] > 0 ? thick++ : thin++;
+    first_[to] = first[i], second_[to] = second[i];
+  }
+  std::erase_if(limits_, [](double limit) { return !(limit > 0); });
+  if (n_thick > 0) test_batch(limited_, first_.data(), second_.data(), n_thick, kind, rule);
+  limited_.separations = {};
+  rule.separated = false;
+  test_batch(limited_, first_.data() + n_thick, second_.data() + n_thick, n - n_thick, kind, rule);
 }
 
 void Worker::test_batch(const Geometry& geometry, const std::uint32_t* first, const std::uint32_t* second,

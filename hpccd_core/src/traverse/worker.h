@@ -115,11 +115,8 @@ class alignas(128) Worker {
   bool grows_batches_ = false;
   std::uint32_t growing_batch_ = first_batch;
   bool nearer_ = false, boxes_leave_much_ = false;
-  std::vector<double> limits_;  // of the candidates of a batch, unless they are in a table
-  struct Sorted {
-    std::vector<std::uint32_t> first, second;
-  };
-  Sorted thick_, thin_;  // the pairs of a batch
+  std::vector<double> limits_;                 // of the candidates of a batch, unless they are in a table
+  std::vector<std::uint32_t> first_, second_;  // the pairs of a batch, those with a separation first
 };
 
 }  // namespace hpccd
