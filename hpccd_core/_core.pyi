@@ -70,6 +70,7 @@ class Scene:
         static: bool,
         edges: NDArray[np.uint32],
     ) -> int: ...
+    def add_plane(self, name: str, normal: Sequence[float], offset: float, static: bool) -> int: ...
     def ignore_pair(self, mesh_a: int, mesh_b: int) -> None: ...
     def set_accuracy(self, mesh_a: int, mesh_b: int, accuracy: Accuracy) -> None: ...
     def set_separation(self, mesh_a: int, mesh_b: int, separation: float) -> None: ...
@@ -88,6 +89,9 @@ class _Slices(TypedDict):
     vf: NDArray[np.int64]
     ee: NDArray[np.int64]
     ef: NDArray[np.int64]
+    vp: NotRequired[NDArray[np.int64]]  # of scenes with such pairs, as vv and ve
+    vv: NotRequired[NDArray[np.int64]]
+    ve: NotRequired[NDArray[np.int64]]
     hashes: NDArray[np.uint64]
     first_tocs: NDArray[np.float64]
 
@@ -96,6 +100,12 @@ class _Contacts(TypedDict):
     vf_toc: NDArray[np.float64]
     ee: NDArray[np.uint32]
     ee_toc: NDArray[np.float64]
+    vp: NotRequired[NDArray[np.uint32]]  # where there are rows, as vv and ve
+    vp_toc: NotRequired[NDArray[np.float64]]
+    vv: NotRequired[NDArray[np.uint32]]
+    vv_toc: NotRequired[NDArray[np.float64]]
+    ve: NotRequired[NDArray[np.uint32]]
+    ve_toc: NotRequired[NDArray[np.float64]]
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
     closest: NDArray[np.float64]
@@ -111,6 +121,12 @@ class _Proximity(TypedDict):
     vf_distance: NDArray[np.float64]
     ee: NDArray[np.uint32]
     ee_distance: NDArray[np.float64]
+    vp: NotRequired[NDArray[np.uint32]]  # where there are rows, as vv and ve
+    vp_distance: NotRequired[NDArray[np.float64]]
+    vv: NotRequired[NDArray[np.uint32]]
+    vv_distance: NotRequired[NDArray[np.float64]]
+    ve: NotRequired[NDArray[np.uint32]]
+    ve_distance: NotRequired[NDArray[np.float64]]
     closest: NDArray[np.float64]
     normals: NDArray[np.float64]
     vertices: NDArray[np.uint32]
@@ -250,6 +266,7 @@ class Detector:
     def faces(self) -> NDArray[np.uint32]: ...
     def set_separation(self, mesh_a: int, mesh_b: int, separation: float) -> None: ...
     def set_thickness(self, mesh: int, values: NDArray[np.float64]) -> None: ...
+    def set_plane(self, plane: int, normal: Sequence[float], offset: float) -> None: ...
     def set_separations(self, of_pairs: NDArray[np.float64]) -> None: ...
     def cancel(self) -> None: ...
     def profile(self) -> dict[str, float]: ...

@@ -416,8 +416,11 @@ def _of_meshes(name: str, value: Mapping[Any, Any], shape: tuple[int, ...], layo
             near = did_you_mean(mesh, layout.mesh_names) if isinstance(mesh, str) else ""
             raise ValueError(f"{name}: no mesh is named {mesh!r}; the scene has {there}{near}")
     parts = []
+    planes = {layout.mesh_names[plane] for plane in layout.planes}  # they have no vertices
     for mesh, n_vertices in zip(layout.mesh_names, layout.vertex_counts, strict=True):
         if mesh not in value:
+            if mesh in planes:
+                continue
             raise ValueError(f"{name}: has no positions of mesh {mesh!r}; give those of every mesh: {there}")
         of_mesh = f"{name}[{mesh!r}]"
         given = value[mesh]

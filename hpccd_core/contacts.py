@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .mesh_layout import Indices, MeshLayout
 from .results import OUTPUT_ARRAYS, WithSides, output
-from .worlds import PairsOfWorlds, Slices
+from .worlds import NO_PAIRS, NO_VALUES, PairsOfWorlds, Slices
 
 
 def toc_gradients(
@@ -29,10 +29,12 @@ def toc_gradients(
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Contacts(WithSides, PairsOfWorlds):
+class Contacts(PairsOfWorlds, WithSides):
     """Contacts of one step in canonical order: N vertex-face rows, then M edge-edge rows.
 
-    :meth:`Detector.detect` and :meth:`Detector.step` return it. ``len(contacts)`` is N + M. Two results are equal if
+    :meth:`Detector.detect` and :meth:`Detector.step` return it. ``len(contacts)`` is the number of rows of all kinds.
+    Scenes with planes, points or ropes have further kinds, whose rows follow in all outputs in the order `vp`, `vv`,
+    `ve`. Two results are equal if
     all their arrays are; they are not hashable: use `hash` as a key.
 
     Attributes
@@ -45,6 +47,13 @@ class Contacts(WithSides, PairsOfWorlds):
         Vertices a0 a1 b0 b1 of two edges, scene-wide: a0 < a1, b0 < b1, (a0, a1) < (b0, b1); sorted.
     ee_toc : ndarray, shape (M,), float64
         Time of impact of each row of `ee`.
+    vp, vp_toc : ndarray, shape (L, 2) uint32 and (L,) float64
+        Vertex and plane, counted among the planes in the order added, and their time of impact: 0 for a vertex that
+        starts outside the half-space.
+    vv, vv_toc : ndarray, shape (P, 2) uint32 and (P,) float64
+        Two points (see :meth:`Scene.add_points`), the lower number first.
+    ve, ve_toc : ndarray, shape (Q, 3) uint32 and (Q,) float64
+        A point, and the vertices of an edge that is in no face, the lower number first.
     first_toc : float
         The earliest time of impact; +inf if there are no contacts. With report="any", that of the one contact reported.
     hash : int
@@ -87,6 +96,12 @@ class Contacts(WithSides, PairsOfWorlds):
     outputs: dict[str, NDArray[Any]] = dataclasses.field(default_factory=dict)
     slices: Slices | None = dataclasses.field(default=None, repr=False)
     layout: MeshLayout | None = dataclasses.field(default=None, repr=False, compare=False)
+    vp: Indices = dataclasses.field(default_factory=lambda: NO_PAIRS["vp"])
+    vp_toc: NDArray[np.float64] = dataclasses.field(default_factory=lambda: NO_VALUES)
+    vv: Indices = dataclasses.field(default_factory=lambda: NO_PAIRS["vv"])
+    vv_toc: NDArray[np.float64] = dataclasses.field(default_factory=lambda: NO_VALUES)
+    ve: Indices = dataclasses.field(default_factory=lambda: NO_PAIRS["ve"])
+    ve_toc: NDArray[np.float64] = dataclasses.field(default_factory=lambda: NO_VALUES)
 
     @property
     def points(self) -> NDArray[np.float64]:
@@ -188,7 +203,7 @@ class Contacts(WithSides, PairsOfWorlds):
         >>> g0[0, 0].tolist(), g1[0, 0].tolist()  # the vertex
         ([0.0, 0.0, 0.25], [0.0, 0.0, 0.25])
         """
-        toc = np.concatenate([self.vf_toc, self.ee_toc])
+        toc = self._values("toc")
         weights, normals = output(self.outputs, "weights", "normals"), self.normals
         return toc_gradients(toc, weights, normals, self.approach)
 
@@ -217,26 +232,10 @@ class Contacts(WithSides, PairsOfWorlds):
         k = self._world_number(k)
         if self.slices is None:
             return self
-        vf, ee = self._rows_of(k)
-        return Contacts(
-            vf=self.vf[vf],
-            vf_toc=self.vf_toc[vf],
-            ee=self.ee[ee],
-            ee_toc=self.ee_toc[ee],
-            first_toc=float(self.slices.first_tocs[k]),
-            hash=int(self.slices.hashes[k]),
-            outputs={name: self._places_of(k, rows) for name, rows in self.outputs.items()},
-            layout=self.layout,
-        )
-
-    def _pairs(self) -> tuple[Indices, Indices, Indices]:
-        return self.vf, self.ee, self.ee[:0, :3]
-
-    def __len__(self) -> int:
-        return len(self.vf) + len(self.ee)
+        return Contacts(**self._fields_of(k, "toc"), first_toc=float(self.slices.first_tocs[k]))
 
     def __repr__(self) -> str:
-        return f"Contacts({len(self.vf)} vertex-face, {len(self.ee)} edge-edge, first at {self.first_toc:.6g})"
+        return f"Contacts({self._counts()}, first at {self.first_toc:.6g})"
 
     @classmethod
     def none(cls, worlds: int | None = None, outputs: Iterable[str] = (), layout: MeshLayout | None = None) -> Contacts:
@@ -271,3 +270,9 @@ class Contacts(WithSides, PairsOfWorlds):
             slices=None if worlds is None else Slices.of_none(worlds),
             layout=layout,
         )
+
+
+# Results of the core have no arrays of kinds without rows: these are read.
+for _kind in ("vp", "vv", "ve"):
+    setattr(Contacts, _kind, NO_PAIRS[_kind])
+    setattr(Contacts, f"{_kind}_toc", NO_VALUES)

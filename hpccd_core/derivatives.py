@@ -53,7 +53,7 @@ def times(detector: Any, start: object, end: object) -> tuple[Contacts, Lineariz
     found: Contacts = detector.detect(start, end)
     # Zero instead of NaN: one contact without a derivative would make the sum over all of them NaN.
     g0, g1 = (np.where(np.isnan(g), 0.0, g) for g in found.toc_gradients())
-    return found, Linearization(np.concatenate([found.vf_toc, found.ee_toc]), _vertices(found, detector), (g0, g1))
+    return found, Linearization(found._values("toc"), _vertices(found, detector), (g0, g1))
 
 
 def first_times(detector: Any, start: object, end: object) -> Linearization:
@@ -78,9 +78,8 @@ def first_times(detector: Any, start: object, end: object) -> Linearization:
 def proximity(detector: Any, positions: object, distance: float) -> tuple[Proximity, Linearization]:
     """The pairs within a distance, and their distances in the order of their rows."""
     near: Proximity = detector.proximity(positions, distance)
-    distances = np.concatenate([near.vf_distance, near.ee_distance])
     gradient = near.weights[:, :, None] * near.normals[:, None, :]
-    return near, Linearization(distances, _vertices(near, detector), (gradient,))
+    return near, Linearization(near._values("distance"), _vertices(near, detector), (gradient,))
 
 
 def smallest_distances(detector: Any, positions: object) -> tuple[Any, Linearization]:
@@ -97,6 +96,5 @@ def smallest_distances(detector: Any, positions: object) -> tuple[Any, Lineariza
 
 
 def _vertices(found: Contacts | Proximity, detector: Any) -> NDArray[np.int64]:
-    worlds = [np.repeat(np.arange(len(o) - 1), np.diff(o)) for o in (found.vf_offsets, found.ee_offsets)]
-    vertices: NDArray[np.int64] = found.vertices + detector.n_vertices * np.concatenate(worlds)[:, None]
+    vertices: NDArray[np.int64] = found.vertices + detector.n_vertices * found._worlds_of_rows()[:, None]
     return vertices

@@ -56,7 +56,7 @@ def _names_of_a_step() -> Iterator[None]:
         raise _core.InvalidArgument(text) from None
 
 
-def _require_device(backend: str, method: str) -> None:
+def _require_device(backend: str, method: str, planes: bool) -> None:
     """Raises ValueError where results cannot stay on a device."""
     if "gpu" not in backends():
         why = gpu_status()["reason"] or "the GPU backend is not part of this build"
@@ -65,6 +65,8 @@ def _require_device(backend: str, method: str) -> None:
         raise ValueError(f"results: 'device' is not offered by backend {backend!r}; use backend='gpu' or 'auto'")
     if method != "default":
         raise ValueError(f"results: 'device' is not offered by method {method!r}, which runs on CPUs; use 'default'")
+    if planes:
+        raise ValueError("results: 'device' is not offered for scenes with planes, which are tested on the host; use 'host'")
 
 
 class Detector(
@@ -228,7 +230,7 @@ class Detector(
         self.results = arguments.choice("results", results, RESULTS)
         self.method = arguments.choice("method", method, METHODS)
         if results == "device":
-            _require_device(backend, method)
+            _require_device(backend, method, len(scene.layout.planes) > 0)
         self._backend = backend
         self._outputs = arguments.output_names(outputs)
         self.features = arguments.feature_names(features)
@@ -404,6 +406,24 @@ class Detector(
         """
         number = arguments.mesh_number("mesh", mesh, self._mesh_numbers)
         self._core.set_thickness(number, arguments.thickness(thickness))
+
+    def set_plane(self, plane: MeshName, normal: ArrayLike, offset: float = 0.0) -> None:
+        """From the next call on, use another half-space; nothing is rebuilt.
+
+        Parameters
+        ----------
+        plane : str or int
+            Its name, or its number from :meth:`Scene.add_plane`.
+        normal : ArrayLike, shape (3,)
+        offset : float
+            Both as in :meth:`Scene.add_plane`.
+
+        Notes
+        -----
+        The plane does not move during a step: for one that moves, give the place that leaves less room.
+        """
+        number = arguments.mesh_number("plane", plane, self._mesh_numbers)
+        self._core.set_plane(number, arguments.vector("normal", normal), arguments.real("offset", offset))
 
     def cancel(self) -> None:
         """End the use of this detector, from any thread and without waiting.

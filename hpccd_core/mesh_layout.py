@@ -16,11 +16,15 @@ NO_INDEX = 2**32 - 1
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class MeshLayout:
-    """Names of the K meshes in the order added, and offsets: (K+1,) int64, the last entry is the total."""
+    """Names of the K meshes in the order added, and offsets: (K+1,) int64, the last entry is the total.
+
+    planes: (P,) uint32, the numbers of the meshes that are planes; they have no vertices.
+    """
 
     mesh_names: tuple[str, ...]
     vertex_offsets: NDArray[np.int64]
     face_offsets: NDArray[np.int64]
+    planes: Indices = dataclasses.field(default_factory=lambda: np.empty(0, np.uint32))
 
     @property
     def vertex_counts(self) -> list[int]:
@@ -32,7 +36,7 @@ class MeshLayout:
 @dataclasses.dataclass(frozen=True, eq=False)
 class Sides:
     """Both sides of N pairs. mesh_a, mesh_b: (N,). local_a, local_b: (N, 2), local to the mesh; `NO_INDEX` where a
-    side, a vertex or a face, has one index."""
+    side, a vertex or a face, has one index; a plane has none."""
 
     mesh_a: Indices
     mesh_b: Indices
@@ -45,15 +49,23 @@ class Sides:
         zeros = np.zeros
         return cls(zeros(n, np.uint32), zeros(n, np.uint32), zeros((n, 2), np.uint32), zeros((n, 2), np.uint32))
 
-    def fill(self, layout: MeshLayout, vf: Indices, ee: Indices, ef: Indices) -> Sides:
-        """Write the sides of vertex-face, edge-edge and edge-face pairs in this order, to arrays full of zeros."""
-        count, n_vf, n_ee = len(vf) + len(ee) + len(ef), len(vf), len(ee)
-        of_vf, of_ee, of_ef = slice(n_vf), slice(n_vf, n_vf + n_ee), slice(n_vf + n_ee, count)
-        self.local_a[of_vf, 1] = self.local_b[of_vf, 1] = self.local_b[of_ef, 1] = NO_INDEX
-        vertices, faces = layout.vertex_offsets, layout.face_offsets
-        for rows, pairs, split, of_b in ((of_vf, vf, 1, faces), (of_ee, ee, 2, vertices), (of_ef, ef, 2, faces)):
-            localise(pairs[:, :split], vertices, self.mesh_a[rows], self.local_a[rows])
-            localise(pairs[:, split:], of_b, self.mesh_b[rows], self.local_b[rows])
+    def fill(self, layout: MeshLayout, **pairs: Indices) -> Sides:
+        """Write the sides of pairs of these kinds in this order, to arrays full of zeros."""
+        begin, vertices, faces = 0, layout.vertex_offsets, layout.face_offsets
+        for kind, rows in pairs.items():
+            of_kind = slice(begin, begin + len(rows))
+            begin += len(rows)
+            split = 2 if kind in ("ee", "ef") else 1
+            if split == 1:
+                self.local_a[of_kind, 1] = NO_INDEX
+            if kind in ("vf", "ef", "vp", "vv"):
+                self.local_b[of_kind, 1] = NO_INDEX
+            localise(rows[:, :split], vertices, self.mesh_a[of_kind], self.local_a[of_kind])
+            if kind == "vp":
+                self.mesh_b[of_kind], self.local_b[of_kind, 0] = layout.planes[rows[:, 1]], NO_INDEX
+                continue
+            of_b = faces if kind in ("vf", "ef") else vertices
+            localise(rows[:, split:], of_b, self.mesh_b[of_kind], self.local_b[of_kind])
         return self
 
 

@@ -12,9 +12,14 @@ import numpy as np
 from . import _core, arguments
 from .contacts import Contacts
 from .results import OUTPUT_ARRAYS, result_of, with_outputs
+from .worlds import PAIR_KINDS
 
 # Name, dtype, shape of a row.
-_ARRAYS = (("vf", "uint32", (2,)), ("vf_toc", "float64", ()), ("ee", "uint32", (4,)), ("ee_toc", "float64", ()))
+_ARRAYS = [
+    array
+    for kind, columns in PAIR_KINDS.items()
+    for array in ((kind, "uint32", (columns,)), (f"{kind}_toc", "float64", ()))
+]
 
 
 def contacts_of_step(results: Sequence[tuple[Contacts, int, int]]) -> Contacts:

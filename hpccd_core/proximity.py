@@ -15,14 +15,14 @@ from . import _core
 from .contours import Contour, EnclosedRegion
 from .mesh_layout import Indices, MeshLayout
 from .results import INTERSECTION_ARRAYS, WithSides, output
-from .worlds import ComparedByRows, OfWorlds, PairsOfWorlds, Slices
+from .worlds import NO_PAIRS, NO_VALUES, ComparedByRows, OfWorlds, PairsOfWorlds, Slices
 
-Kind = Literal["vertex-face", "edge-edge", "edge-face", ""]
+Kind = Literal["vertex-face", "edge-edge", "edge-face", "vertex-plane", "vertex-vertex", "vertex-edge", ""]
 Inside = Literal["a", "b", "both"]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Proximity(WithSides, PairsOfWorlds):
+class Proximity(PairsOfWorlds, WithSides):
     """Pairs of features within a distance of each other: N vertex-face rows, then M edge-edge rows.
 
     :meth:`Detector.proximity` returns it. Order, equality and worlds as in :class:`Contacts`.
@@ -38,6 +38,10 @@ class Proximity(WithSides, PairsOfWorlds):
         Vertices a0 a1 b0 b1 of two edges, ordered as in Contacts.
     ee_distance : ndarray, shape (M,), float64
         The same of each row of `ee`.
+    vp, vp_distance : ndarray, shape (L, 2) uint32 and (L,) float64
+        Vertex and plane as in Contacts, and the signed distance: negative outside the half-space.
+    vv, vv_distance, ve, ve_distance : ndarray
+        Points, and points and edges, as in Contacts, with their distances.
     hash : int
         64-bit; the same for the same pairs and distances on any backend and with any number of threads.
     outputs : dict of str to ndarray
@@ -52,6 +56,12 @@ class Proximity(WithSides, PairsOfWorlds):
     outputs: dict[str, NDArray[Any]] = dataclasses.field(default_factory=dict)
     slices: Slices | None = dataclasses.field(default=None, repr=False)
     layout: MeshLayout | None = dataclasses.field(default=None, repr=False, compare=False)
+    vp: Indices = dataclasses.field(default_factory=lambda: NO_PAIRS["vp"])
+    vp_distance: NDArray[np.float64] = dataclasses.field(default_factory=lambda: NO_VALUES)
+    vv: Indices = dataclasses.field(default_factory=lambda: NO_PAIRS["vv"])
+    vv_distance: NDArray[np.float64] = dataclasses.field(default_factory=lambda: NO_VALUES)
+    ve: Indices = dataclasses.field(default_factory=lambda: NO_PAIRS["ve"])
+    ve_distance: NDArray[np.float64] = dataclasses.field(default_factory=lambda: NO_VALUES)
 
     @property
     def closest(self) -> NDArray[np.float64]:
@@ -94,25 +104,16 @@ class Proximity(WithSides, PairsOfWorlds):
         k = self._world_number(k)
         if self.slices is None:
             return self
-        vf, ee = self._rows_of(k)
-        return Proximity(
-            vf=self.vf[vf],
-            vf_distance=self.vf_distance[vf],
-            ee=self.ee[ee],
-            ee_distance=self.ee_distance[ee],
-            hash=int(self.slices.hashes[k]),
-            outputs={name: self._places_of(k, rows) for name, rows in self.outputs.items()},
-            layout=self.layout,
-        )
-
-    def _pairs(self) -> tuple[Indices, Indices, Indices]:
-        return self.vf, self.ee, self.ee[:0, :3]
-
-    def __len__(self) -> int:
-        return len(self.vf) + len(self.ee)
+        return Proximity(**self._fields_of(k, "distance"))
 
     def __repr__(self) -> str:
-        return f"Proximity({len(self.vf)} vertex-face, {len(self.ee)} edge-edge)"
+        return f"Proximity({self._counts()})"
+
+
+# As for Contacts.
+for _kind in ("vp", "vv", "ve"):
+    setattr(Proximity, _kind, NO_PAIRS[_kind])
+    setattr(Proximity, f"{_kind}_distance", NO_VALUES)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -298,9 +299,8 @@ class Intersections(WithSides, OfWorlds):
             faces=self.faces,
         )
 
-    def _pairs(self) -> tuple[Indices, Indices, Indices]:
-        none = self.ef[:0]
-        return none, none, self.ef
+    def _pairs(self) -> dict[str, Indices]:
+        return {"ef": self.ef}
 
     def __len__(self) -> int:
         return len(self.ef)
@@ -323,8 +323,10 @@ class Gap(ComparedByRows):
         Euclidean, of the surfaces, in the unit of the coordinates; 0 if they touch or intersect, +inf if no pair of
         features exists. With thickness minus that of both features: negative where thick surfaces overlap. For
         "edge-face" then minus the thickness of the edge and face in `features`.
+        From a plane: that of the vertex deepest outside the half-space, which is negative, or nearest to it.
     kind : str
-        "vertex-face", "edge-edge", "edge-face" (they intersect) or "" (no pair exists).
+        "vertex-face", "edge-edge", "edge-face" (they intersect), "vertex-plane", "vertex-vertex", "vertex-edge" or ""
+        (no pair exists).
     features : tuple of int
         Scene-wide indices as in a row of Contacts.vf, Contacts.ee or Intersections.ef: of the nearest pairs the first
         in order, vertex-face before edge-edge.

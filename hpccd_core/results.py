@@ -81,8 +81,8 @@ class WithSides:
 
     layout: MeshLayout | None
 
-    def _pairs(self) -> tuple[Indices, Indices, Indices]:
-        """vf, ee and ef."""
+    def _pairs(self) -> dict[str, Indices]:
+        """The pairs of each kind, in the order of the rows."""
         raise NotImplementedError
 
     def __getitem__(self, row: NoReturn) -> NoReturn:
@@ -97,8 +97,8 @@ class WithSides:
             raise ValueError(
                 f"{type(self).__name__}: has no layout of meshes; use a result of a detector, or Scene.locate"
             )
-        vf, ee, ef = self._pairs()
-        return Sides.zeros(len(vf) + len(ee) + len(ef)).fill(self.layout, vf, ee, ef)
+        pairs = self._pairs()
+        return Sides.zeros(sum(map(len, pairs.values()))).fill(self.layout, **pairs)
 
     @property
     def mesh_a(self) -> Indices:
@@ -108,7 +108,7 @@ class WithSides:
 
     @property
     def mesh_b(self) -> Indices:
-        """(n,) uint32: the number of the mesh of side b of each row: of the face, or of edge b."""
+        """(n,) uint32: the number of the mesh of side b of each row: of the face, of edge b, or of the plane."""
         return self._sides.mesh_b
 
     @property
@@ -118,7 +118,8 @@ class WithSides:
 
     @property
     def local_b(self) -> Indices:
-        """(n, 2) uint32: side b in indices of its own mesh: the face and 2**32 - 1, or both vertices of the edge."""
+        """(n, 2) uint32: side b in indices of its own mesh: the face and 2**32 - 1, or both vertices of the edge;
+        for planes both are 2**32 - 1."""
         return self._sides.local_b
 
 

@@ -113,6 +113,56 @@ class Scene:
             self._repeat("set_thickness", (self._ids[name], numbers.copy()))
         return self._ids[name]
 
+    def add_plane(
+        self, name: str, normal: ArrayLike = (0.0, 0.0, 1.0), offset: float = 0.0, *, static: bool = True
+    ) -> int:
+        """Add the half-space ``normal . x >= offset``, in which all vertices should stay, and return its number.
+
+        Vertices outside it, or within the separation of its border, are in contact with it: `Contacts.vp`.
+
+        Parameters
+        ----------
+        name : str
+            Unique name; planes are numbered together with the meshes, so every method that takes a mesh for a pair
+            takes a plane too.
+        normal : ArrayLike, shape (3,)
+            Points into the half-space; of any length except 0.
+        offset : float
+            ``normal . x`` on the plane.
+        static : bool
+            A static plane is not tested against static meshes.
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        TypeError, ValueError
+            If an argument has the wrong type or shape, is not finite, or the name is taken.
+
+        Notes
+        -----
+        Tested by rational arithmetic at every accuracy, whatever `features` says. A plane has no vertices: positions
+        are those of the meshes only.
+
+        Examples
+        --------
+        >>> import hpccd_core as hc
+        >>> scene = hc.Scene()
+        >>> _ = scene.add_mesh("falling", [[0, 1, 2]])
+        >>> _ = scene.add_plane("floor")
+        >>> start = [[0.0, 0, 1], [1, 0, 3], [0, 1, 3]]
+        >>> end = [[0.0, 0, -1], [1, 0, 1], [0, 1, 1]]
+        >>> contacts = hc.Detector(scene).detect(start, end)
+        >>> contacts.vp.tolist(), contacts.vp_toc.tolist()
+        ([[0, 0]], [0.5])
+        """
+        name = arguments.text("name", name)
+        static, numbers = arguments.flag("static", static), tuple(arguments.vector("normal", normal))
+        self._repeat("add_plane", (name, numbers, arguments.real("offset", offset), static))
+        return self._ids[name]
+
     def ignore_pair(self, mesh_a: MeshName, mesh_b: MeshName) -> None:
         """Never report contacts between two meshes.
 
@@ -176,7 +226,7 @@ class Scene:
         elif name == "set_features":
             given = (*values[:2], _core.TestedFeatures(*values[2]))
         number = getattr(self._core, name)(*given)
-        if name == "add_mesh":
+        if name in ("add_mesh", "add_plane"):
             self._ids[values[0]], self._layout = number, None
         self._calls.append((name, values))
 
@@ -194,13 +244,19 @@ class Scene:
         """How many pairs of meshes are tested, a mesh with itself included: by the rules of the core."""
         moves: list[bool] = []
         by_itself: list[bool] = []
+        planes: list[bool] = []
         for name, values in self._calls:
-            if name == "add_mesh":
-                moves.append(not values[4])
-                by_itself.append(values[3] and not values[4])
+            if name in ("add_mesh", "add_plane"):
+                planes.append(name == "add_plane")
+                moves.append(not values[-1] if planes[-1] else not values[4])
+                by_itself.append(not planes[-1] and values[3] and not values[4])
         ignored = {tuple(sorted(values)) for name, values in self._calls if name == "ignore_pair"}
-        n_ignored: int = sum(by_itself[a] if a == b else moves[a] or moves[b] for a, b in ignored)
-        return math.comb(len(moves), 2) - math.comb(moves.count(False), 2) + sum(by_itself) - n_ignored
+        n_ignored: int = sum(
+            by_itself[a] if a == b else (moves[a] or moves[b]) and not (planes[a] and planes[b]) for a, b in ignored
+        )
+        at_rest = [plane for plane, moving in zip(planes, moves, strict=True) if not moving]
+        pairs, between = math.comb(len(moves), 2) - math.comb(len(at_rest), 2), math.comb(sum(planes), 2)
+        return pairs - (between - math.comb(sum(at_rest), 2)) + sum(by_itself) - n_ignored
 
     def _number(self, name: str, mesh: MeshName) -> int:
         return arguments.mesh_number(name, mesh, self._ids)
@@ -226,7 +282,10 @@ class Scene:
         if self._layout is None:
             firsts = [(self._core.first_vertex(k), self._core.first_face(k)) for k in self._ids.values()]
             offsets = np.array([*firsts, (self.n_vertices, self.n_faces)], np.int64)
-            self._layout = MeshLayout(tuple(self._ids), offsets[:, 0].copy(), offsets[:, 1].copy())
+            planes = [self._ids[values[0]] for name, values in self._calls if name == "add_plane"]
+            self._layout = MeshLayout(
+                tuple(self._ids), offsets[:, 0].copy(), offsets[:, 1].copy(), np.array(planes, np.uint32)
+            )
         return self._layout
 
     @overload

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import arguments
+from .mesh_layout import MeshLayout
 
 Row = TypeVar("Row", bound=np.generic)
 
@@ -51,7 +52,7 @@ def _equal(a: Any, b: Any) -> bool:
 class Slices(ComparedByRows):
     """Rows of W worlds; arrays that a result does not have are empty.
 
-    vf, ee, ef: (W+1,) int64, where the rows of each world begin, and their total. hashes: (W,) uint64, of each world's
+    vf, ee, ef, vp, vv, ve: (W+1,) int64, where the rows of each world begin, and their total. hashes: (W,) uint64, of each world's
     rows. first_tocs: (W,) float64.
     """
 
@@ -60,6 +61,9 @@ class Slices(ComparedByRows):
     ef: NDArray[np.int64]
     hashes: NDArray[np.uint64]
     first_tocs: NDArray[np.float64]
+    vp: NDArray[np.int64] = dataclasses.field(default_factory=lambda: np.empty(0, np.int64))
+    vv: NDArray[np.int64] = dataclasses.field(default_factory=lambda: np.empty(0, np.int64))
+    ve: NDArray[np.int64] = dataclasses.field(default_factory=lambda: np.empty(0, np.int64))
 
     @classmethod
     def of_none(cls, worlds: int) -> Slices:
@@ -74,17 +78,49 @@ class OfWorlds(ComparedByRows):
     slices: Slices | None
 
     def _offsets(self, kind: str, rows: int) -> NDArray[np.int64]:
-        return np.array([0, rows], np.int64) if self.slices is None else getattr(self.slices, kind)
+        if self.slices is None:
+            return np.array([0, rows], np.int64)
+        offsets: NDArray[np.int64] = getattr(self.slices, kind)
+        return offsets if len(offsets) else np.zeros(len(self.slices.hashes) + 1, np.int64)
 
     def _world_number(self, k: int) -> int:
         return arguments.whole_number("world", k, 0, 0 if self.slices is None else len(self.slices.hashes) - 1)
 
 
+KIND_NAMES = {
+    "vf": "vertex-face",
+    "ee": "edge-edge",
+    "vp": "vertex-plane",
+    "vv": "vertex-vertex",
+    "ve": "vertex-edge",
+}
+
+#: Kinds of pairs, in the order of their rows in the outputs, and the indices in a row.
+PAIR_KINDS = {"vf": 2, "ee": 4, "vp": 2, "vv": 2, "ve": 3}
+
+
+def _none(*shape: int, dtype: str) -> NDArray[Any]:
+    empty = np.empty(shape, dtype)
+    empty.flags.writeable = False  # all results share it
+    return empty
+
+
+#: Without rows, by the name of an array without its ending.
+NO_PAIRS = {kind: _none(0, columns, dtype="uint32") for kind, columns in PAIR_KINDS.items()}
+NO_VALUES = _none(0, dtype="float64")
+
+
 class PairsOfWorlds(OfWorlds):
-    """A result with vertex-face and edge-edge pairs."""
+    """A result with pairs of these kinds. Most results have vertex-face and edge-edge pairs only: the core returns no
+    arrays of the others, and those of the class are read."""
 
     vf: NDArray[np.uint32]
     ee: NDArray[np.uint32]
+    vp: NDArray[np.uint32]
+    vv: NDArray[np.uint32]
+    ve: NDArray[np.uint32]
+    outputs: dict[str, NDArray[Any]]
+    layout: MeshLayout | None
 
     @property
     def vf_offsets(self) -> NDArray[np.int64]:
@@ -96,13 +132,54 @@ class PairsOfWorlds(OfWorlds):
         """(W+1,) int64: the edge-edge pairs of world k are the rows ee_offsets[k] to ee_offsets[k + 1]."""
         return self._offsets("ee", len(self.ee))
 
-    def _rows_of(self, k: int) -> tuple[slice, slice]:
-        """Rows of world k, vertex-face and edge-edge."""
-        vf, ee = self.vf_offsets, self.ee_offsets
-        return slice(int(vf[k]), int(vf[k + 1])), slice(int(ee[k]), int(ee[k + 1]))
+    @property
+    def vp_offsets(self) -> NDArray[np.int64]:
+        """(W+1,) int64: the vertex-plane pairs of world k are the rows vp_offsets[k] to vp_offsets[k + 1]."""
+        return self._offsets("vp", len(self.vp))
 
-    def _places_of(self, k: int, places: NDArray[Row]) -> NDArray[Row]:
-        """Rows of world k of an array that holds all vertex-face rows, then all edge-edge rows."""
-        vf, ee = self._rows_of(k)
-        n = len(self.vf)
-        return np.concatenate([places[vf], places[n + ee.start : n + ee.stop]])
+    @property
+    def vv_offsets(self) -> NDArray[np.int64]:
+        """(W+1,) int64: the point-point pairs of world k are the rows vv_offsets[k] to vv_offsets[k + 1]."""
+        return self._offsets("vv", len(self.vv))
+
+    @property
+    def ve_offsets(self) -> NDArray[np.int64]:
+        """(W+1,) int64: the point-edge pairs of world k are the rows ve_offsets[k] to ve_offsets[k + 1]."""
+        return self._offsets("ve", len(self.ve))
+
+    def _kinds(self) -> list[str]:
+        """Kinds with rows, beside vertex-face and edge-edge, which come first."""
+        return [kind for kind in PAIR_KINDS if kind in ("vf", "ee") or len(getattr(self, kind))]
+
+    def _fields_of(self, k: int, value: str) -> dict[str, Any]:
+        """The rows of world k: those of each kind, of their values, whose names end like this, and of the outputs."""
+        fields, places, first = {}, [], 0
+        for kind in self._kinds():
+            pairs, offsets = getattr(self, kind), getattr(self, f"{kind}_offsets")
+            begin, end = int(offsets[k]), int(offsets[k + 1])
+            fields[kind] = pairs[begin:end]
+            fields[f"{kind}_{value}"] = getattr(self, f"{kind}_{value}")[begin:end]
+            places.append(slice(first + begin, first + end))
+            first += len(pairs)
+        outputs = {name: np.concatenate([rows[of] for of in places]) for name, rows in self.outputs.items()}
+        assert self.slices is not None
+        return fields | {"hash": int(self.slices.hashes[k]), "outputs": outputs, "layout": self.layout}
+
+    def _values(self, value: str) -> NDArray[np.float64]:
+        """The values of all rows, whose names end like this, in the order of the outputs."""
+        return np.concatenate([getattr(self, f"{kind}_{value}") for kind in self._kinds()])
+
+    def _worlds_of_rows(self) -> NDArray[np.intp]:
+        """(n,): the world of each row, in the order of the outputs."""
+        offsets = [getattr(self, f"{kind}_offsets") for kind in self._kinds()]
+        return np.concatenate([np.repeat(np.arange(len(o) - 1), np.diff(o)) for o in offsets])
+
+    def _pairs(self) -> dict[str, NDArray[np.uint32]]:
+        return {kind: getattr(self, kind) for kind in self._kinds()}
+
+    def _counts(self) -> str:
+        """For repr()."""
+        return ", ".join(f"{len(getattr(self, kind))} {KIND_NAMES[kind]}" for kind in self._kinds())
+
+    def __len__(self) -> int:
+        return sum(len(getattr(self, kind)) for kind in self._kinds())

@@ -15,7 +15,7 @@ set(hpccd_sources
   src/elementary/exact/wide/earliest.cpp src/elementary/exact/wide/first_time.cpp
   src/elementary/exact/wide/isolate.cpp src/elementary/exact/wide/part.cpp src/elementary/exact/wide/root.cpp
   src/elementary/exact/wide/sign_at_root.cpp src/elementary/fallback.cpp src/elementary/intersection_batch.cpp
-  src/elementary/queries.cpp
+  src/elementary/half_space.cpp src/elementary/queries.cpp
   src/traverse/contact_search.cpp src/traverse/drift.cpp src/traverse/far_pairs.cpp src/traverse/fine_boxes.cpp
   src/traverse/leaf_edge_faces.cpp src/traverse/leaf_hulls.cpp src/traverse/leaf_pairs.cpp src/traverse/mesh_pairs.cpp
   src/traverse/less_excess.cpp src/traverse/near_corners.cpp src/traverse/nearest_pairs.cpp
@@ -33,6 +33,6 @@ set(hpccd_sources
   src/hybrid/communication.cpp src/hybrid/engine.cpp src/hybrid/segments.cpp src/hybrid/sink.cpp
   src/backends/available.cpp src/backends/cpu_backend.cpp src/backends/gpu_backend.cpp
   src/backends/gpu_contacts.cpp src/backends/hybrid_backend.cpp src/backends/moving_tree.cpp src/backends/near_list.cpp
-  src/backends/changed_pairs.cpp src/backends/one_by_one.cpp src/backends/resources.cpp src/backends/shortening.cpp src/backends/tuner.cpp
+  src/backends/changed_pairs.cpp src/backends/one_by_one.cpp src/backends/planes.cpp src/backends/resources.cpp src/backends/shortening.cpp src/backends/tuner.cpp
   src/backends/work_counts.cpp src/backends/world_by_world.cpp src/backends/worlds_on_cpus.cpp
   src/checked.cpp src/detector.cpp src/errors.cpp src/prepared.cpp src/version.cpp)

@@ -60,9 +60,24 @@ void add_slices(py::dict& answer, WorldSlices&& s, std::vector<double>&& first_t
   d["vf"] = hand_over<std::int64_t>(std::move(s.vf));
   d["ee"] = hand_over<std::int64_t>(std::move(s.ee));
   d["ef"] = hand_over<std::int64_t>(std::move(s.ef));
+  if (!s.vp.empty()) d["vp"] = hand_over<std::int64_t>(std::move(s.vp));
+  if (!s.vv.empty()) d["vv"] = hand_over<std::int64_t>(std::move(s.vv));
+  if (!s.ve.empty()) d["ve"] = hand_over<std::int64_t>(std::move(s.ve));
   d["hashes"] = hand_over<std::uint64_t>(std::move(s.hashes));
   d["first_tocs"] = hand_over<double>(std::move(first_tocs));
   answer["slices"] = std::move(d);
+}
+
+// Kinds without rows are left out: each array costs as much as the rest of a small call.
+template <class Result>
+void add_other_kinds(py::dict& d, Result& r, std::vector<double> Result::* vp, std::vector<double> Result::* vv,
+                     std::vector<double> Result::* ve, const std::string& value) {
+  const auto add = [&](const char* kind, auto& rows, std::vector<double>& values, py::ssize_t columns) {
+    if (rows.empty()) return;
+    d[kind] = hand_over<std::uint32_t>(std::move(rows), columns);
+    d[(kind + value).c_str()] = hand_over<double>(std::move(values));
+  };
+  add("vp", r.vp, r.*vp, 2), add("vv", r.vv, r.*vv, 2), add("ve", r.ve, r.*ve, 3);
 }
 
 py::dict to_dict(Contacts&& c) {
@@ -71,6 +86,7 @@ py::dict to_dict(Contacts&& c) {
   d["vf_toc"] = hand_over<double>(std::move(c.vf_toc));
   d["ee"] = hand_over<std::uint32_t>(std::move(c.ee), 4);
   d["ee_toc"] = hand_over<double>(std::move(c.ee_toc));
+  add_other_kinds(d, c, &Contacts::vp_toc, &Contacts::vv_toc, &Contacts::ve_toc, "_toc");
   d["points"] = hand_over<double>(std::move(c.points), 3);
   d["normals"] = hand_over<double>(std::move(c.normals), 3);
   d["closest"] = hand_over<double>(std::move(c.closest), 2, 3);
@@ -89,6 +105,7 @@ py::dict to_dict(Proximity&& c) {
   d["vf_distance"] = hand_over<double>(std::move(c.vf_distance));
   d["ee"] = hand_over<std::uint32_t>(std::move(c.ee), 4);
   d["ee_distance"] = hand_over<double>(std::move(c.ee_distance));
+  add_other_kinds(d, c, &Proximity::vp_distance, &Proximity::vv_distance, &Proximity::ve_distance, "_distance");
   d["closest"] = hand_over<double>(std::move(c.closest), 2, 3);
   d["normals"] = hand_over<double>(std::move(c.normals), 3);
   d["vertices"] = hand_over<std::uint32_t>(std::move(c.vertices), 4);
@@ -146,6 +163,9 @@ ContactsOfPart part_of(const py::handle& contacts, double part, double parts, st
   ContactsOfPart of;
   read("vf", of.vf, std::uint32_t{}), read("vf_toc", of.vf_toc, double{});
   read("ee", of.ee, std::uint32_t{}), read("ee_toc", of.ee_toc, double{});
+  read("vp", of.vp, std::uint32_t{}), read("vp_toc", of.vp_toc, double{});
+  read("vv", of.vv, std::uint32_t{}), read("vv_toc", of.vv_toc, double{});
+  read("ve", of.ve, std::uint32_t{}), read("ve_toc", of.ve_toc, double{});
   read("points", of.points, double{}), read("normals", of.normals, double{}), read("closest", of.closest, double{});
   read("vertices", of.vertices, std::uint32_t{}), read("weights", of.weights, double{});
   read("approach", of.approach, double{});
@@ -161,6 +181,12 @@ const char* name_of(GapKind kind) {
       return "edge-edge";
     case GapKind::edge_face:
       return "edge-face";
+    case GapKind::vertex_plane:
+      return "vertex-plane";
+    case GapKind::vertex_vertex:
+      return "vertex-vertex";
+    case GapKind::vertex_edge:
+      return "vertex-edge";
     case GapKind::none:
       break;
   }
@@ -168,7 +194,20 @@ const char* name_of(GapKind kind) {
 }
 
 std::size_t n_features(GapKind kind) {
-  return kind == GapKind::none ? 0 : kind == GapKind::vertex_face ? 2 : kind == GapKind::edge_edge ? 4 : 3;
+  switch (kind) {
+    case GapKind::none:
+      return 0;
+    case GapKind::edge_edge:
+      return 4;
+    case GapKind::edge_face:
+    case GapKind::vertex_edge:
+      return 3;
+    case GapKind::vertex_face:
+    case GapKind::vertex_plane:
+    case GapKind::vertex_vertex:
+      break;
+  }
+  return 2;
 }
 
 const char* name_of(Inside inside) {
@@ -192,7 +231,7 @@ py::list to_list(const std::vector<Gap>& gaps) {
     const std::span<const std::uint32_t> features(g.features.data(), n_features(g.kind));
     py::array_t<double> points(std::vector<py::ssize_t>{g.kind == GapKind::none ? 0 : 2, 3});
     if (g.kind != GapKind::none) std::copy_n(g.points[0].data(), 6, points.mutable_data());
-    const bool apart = g.kind == GapKind::vertex_face || g.kind == GapKind::edge_edge;
+    const bool apart = g.kind != GapKind::none && g.kind != GapKind::edge_face;
     const auto rows = [&](const auto& row) {
       return py::array_t<typename std::decay_t<decltype(row)>::value_type>(apart ? row.size() : 0, row.data());
     };
@@ -336,6 +375,12 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
                               {self_collision, is_static}, {edges.data(), static_cast<std::size_t>(edges.size())});
           },
           "name"_a, "faces"_a, "n_vertices"_a, "self_collision"_a, "static"_a, "edges"_a)
+      .def(
+          "add_plane",
+          [](Scene& s, const std::string& name, const std::array<double, 3>& normal, double offset, bool is_static) {
+            return s.add_plane(name, {normal, offset}, is_static);
+          },
+          "name"_a, "normal"_a, "offset"_a, "static"_a)
       .def("ignore_pair", &Scene::ignore_pair, "mesh_a"_a, "mesh_b"_a)
       .def("set_accuracy", &Scene::set_accuracy, "mesh_a"_a, "mesh_b"_a, "accuracy"_a)
       .def("set_separation", &Scene::set_separation, "mesh_a"_a, "mesh_b"_a, "separation"_a)
@@ -503,6 +548,12 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
             unlocked_if_busy(d, [&] { d.set_separations(numbers); });
           },
           "of_pairs"_a)
+      .def(
+          "set_plane",
+          [](Detector& d, std::uint32_t plane, const std::array<double, 3>& normal, double offset) {
+            unlocked_if_busy(d, [&] { d.set_plane(plane, {normal, offset}); });
+          },
+          "plane"_a, "normal"_a, "offset"_a)
       // Every face of the scene, with scene-wide vertices.
       .def("faces",
            [](const Detector& d) {

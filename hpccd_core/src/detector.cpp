@@ -201,7 +201,7 @@ struct Detector::Impl {
   // Whether results may be returned in the memory that a GPU has written.
   bool gives_in_place(Backend picked) const {
     const Options& o = options();
-    return picked == Backend::gpu && o.worlds == 1 && !Outputs::of_contacts(o).any();
+    return picked == Backend::gpu && o.worlds == 1 && !Outputs::of_contacts(o).any() && !common.planes.any();
   }
 
   Detection compute(Backend picked, Positions t0, Positions t1) {
@@ -229,9 +229,24 @@ struct Detector::Impl {
         }
       }
       Detection d = compute(in_place ? Backend::cpu : picked, t0, t1);
+      Counts of_planes = with_planes([&](const Planes& planes) {
+        const Options& o = options();
+        return Counts{{"vp_contacts", planes.add_contacts(d.contacts, backends().on_host(t0, 0), backends().on_host(t1, 1),
+                                                          o.report, Outputs::of_contacts(o), common.pool)}};
+      });
       note(picked, d.computed_by, d.contacts.vf.size(), d.contacts.ee.size());
+      found->merge(of_planes);
       return {std::nullopt, std::move(d.contacts)};
     });
+  }
+
+  // After a query without them: the planes of the scene, if there are any.
+  template <class Query>
+  Counts with_planes(Query&& query) {
+    if (!common.planes.any()) return {};
+    Counts counts = query(std::as_const(common.planes));
+    profiler().mark("planes");
+    return counts;
   }
 
   // A query of a motion, or of a snapshot given twice: on the selected backend if it supports the query and works,
@@ -340,8 +355,16 @@ double Detector::collision_free_step(Positions t0, Positions t1) {
 std::vector<double> Detector::collision_free_steps(Positions t0, Positions t1) {
   const StandardArithmetic arithmetic;
   impl_->check(t0, t1);
-  std::vector<double> first = impl_->ask(
-      t0, t1, [](DetectionBackend& backend, Positions a, Positions b, Counts&) { return backend.earliest(a, b); });
+  std::vector<double> first = impl_->ask(t0, t1, [&](DetectionBackend& backend, Positions a, Positions b, Counts&) {
+    auto times = backend.earliest(a, b);
+    if (times)
+      impl_->with_planes([&](const Planes& planes) {
+        AvailableBackends& all = impl_->backends();
+        planes.limit_steps(*times, all.on_host(a, 0), all.on_host(b, 1), impl_->common.pool);
+        return Counts{};
+      });
+    return times;
+  });
   // A whole step would end in contact if one comes at its end.
   constexpr double just_before_the_end = 1 - 0x1p-53;
   for (double& time : first) time = time > 1 ? 1 : std::min(time, just_before_the_end);
@@ -379,7 +402,13 @@ Proximity Detector::proximity(Positions vertices, double distance) {
   check_length("distance", distance);
   return as_proximity(impl_->snapshot(vertices, [&](DetectionBackend& backend, Positions v, Counts& found) {
     auto near = backend.proximity(v, distance);
-    if (near) found = {{"vf_near", near->vf.size()}, {"ee_near", near->ee.size()}};
+    if (!near) return near;
+    found = impl_->with_planes([&](const Planes& planes) {
+      const Positions on_host = impl_->backends().on_host(v, 0);
+      return Counts{{"vp_near", planes.add_near(*near, on_host, distance, Outputs::of_proximity(impl_->options()),
+                                                impl_->common.pool)}};
+    });
+    found["vf_near"] = near->vf.size(), found["ee_near"] = near->ee.size();
     return near;
   }));
 }
@@ -456,9 +485,14 @@ DeviceResults Detector::intersections_on_device(Positions vertices) {
 
 std::vector<Gap> Detector::distances(Positions vertices) {
   const StandardArithmetic arithmetic;
-  return impl_->snapshot(vertices, [](DetectionBackend& backend, Positions v, Counts& found) {
+  return impl_->snapshot(vertices, [&](DetectionBackend& backend, Positions v, Counts& found) {
     auto gaps = backend.distances(v);
-    if (gaps) found = {{"gaps", gaps->size()}};
+    if (!gaps) return gaps;
+    impl_->with_planes([&](const Planes& planes) {
+      planes.add_gaps(*gaps, impl_->backends().on_host(v, 0), impl_->options().worlds, impl_->common.pool);
+      return Counts{};
+    });
+    found = {{"gaps", gaps->size()}};
     return gaps;
   });
 }
@@ -531,6 +565,12 @@ void Detector::set_thickness(std::uint32_t mesh, std::span<const double> thickne
   impl_->common.thickness.set(mesh, thickness);
 }
 
+void Detector::set_plane(std::uint32_t plane, const Plane& value) {
+  const StandardArithmetic arithmetic;
+  const std::lock_guard lock(impl_->one_call);
+  impl_->common.planes.set(plane, value);
+}
+
 void Detector::cancel() { impl_->cancellation().request(); }
 
 std::map<std::string, double> Detector::profile() const {
@@ -550,7 +590,7 @@ std::map<std::string, std::uint64_t> Detector::stats() const {
   stats.insert(d.found->begin(), d.found->end());
   stats["triangles"] = d.common.features.n_faces();
   stats["bytes"] += d.engine->shared.tree.bytes() + d.common.features.bytes() + d.common.separations.bytes() +
-                    d.common.thickness.bytes() + d.common.rules.bytes();
+                    d.common.thickness.bytes() + d.common.rules.bytes() + d.common.planes.bytes();
   if (d.options().worlds > 1) stats["worlds"] = d.options().worlds;
   return stats;
 }

@@ -50,7 +50,7 @@ def fill_pairs(message: ContactArray, pairs: FeaturePairs, layout: Layout) -> No
     kinds[n_vf : n_vf + n_ee], kinds[n_vf + n_ee :] = ContactArray.EDGE_EDGE, ContactArray.EDGE_FACE
     in_a, in_b = (np.frombuffer(mesh, np.uint32) for mesh in (mesh_a, mesh_b))
     side_a, side_b = (np.frombuffer(side, np.uint32).reshape(-1, 2) for side in (features_a, features_b))
-    Sides(in_a, in_b, side_a, side_b).fill(layout, pairs.vf, pairs.ee, pairs.ef)
+    Sides(in_a, in_b, side_a, side_b).fill(layout, vf=pairs.vf, ee=pairs.ee, ef=pairs.ef)
     # Only now: the setters copy, unless the message was made with check_fields=True.
     message.kind, message.mesh_a, message.mesh_b = kind, mesh_a, mesh_b
     message.features_a, message.features_b = features_a, features_b

@@ -372,7 +372,7 @@ std::optional<CollisionFreeMotion> CpuBackend::free_motion(Positions t0, Positio
     search_->report = Report::all, counts_.earliest = false;
     shared_.tree.fit(shared_.profiler);
     walk_tree(*search_);
-    if (motion.shorten(touching()).empty()) break;
+    if (motion.shorten(touching(t0, motion.end())).empty()) break;
   }
   shared_.cancellation.heed();
   return std::move(motion).result();
@@ -381,10 +381,10 @@ std::optional<CollisionFreeMotion> CpuBackend::free_motion(Positions t0, Positio
 // Until no candidate touches. False if none did.
 bool CpuBackend::shorten_to_rest(Positions t0, Shortening& motion) {
   search_whole_ways(t0, motion.end());
-  std::span<const std::uint32_t> vertices = motion.shorten(touching());
+  std::span<const std::uint32_t> vertices = motion.shorten(touching(t0, motion.end()));
   const bool shortened = !vertices.empty();
   if (shortened) whole_->pairs.join(shared_.pool);
-  for (; !vertices.empty(); vertices = motion.shorten(touching())) {
+  for (; !vertices.empty(); vertices = motion.shorten(touching(t0, motion.end()))) {
     whole_->tree.shorten(t0, motion.end(), vertices);
     shared_.profiler.mark("bounds");
     for (Worker& w : workers_) w.begin(*search_);
@@ -413,7 +413,7 @@ void CpuBackend::search_whole_ways(Positions t0, Positions t1) {
   walk_tree(*search_);
 }
 
-std::span<const Shortening::Touching> CpuBackend::touching() {
+std::span<const Shortening::Touching> CpuBackend::touching(Positions t0, Positions t1) {
   std::size_t n = 0;
   for (const Worker& w : workers_) n += w.vertex_face.size() + w.edge_edge.size();
   resize(touching_, n, shared_.cancellation);
@@ -429,6 +429,10 @@ std::span<const Shortening::Touching> CpuBackend::touching() {
                     pair->toc = c.toc;
                   }
                 });
+  if (shared_.common.planes.any()) {
+    shared_.common.planes.add_touching(touching_, t0, t1, shared_.pool);
+    shared_.profiler.mark("planes");
+  }
   return touching_;
 }
 

@@ -76,7 +76,7 @@ class CpuBackend final : public DetectionBackend {
   void remember_earliest();
   bool shorten_to_rest(Positions t0, Shortening& motion);
   void search_whole_ways(Positions t0, Positions t1);
-  std::span<const Shortening::Touching> touching();
+  std::span<const Shortening::Touching> touching(Positions t0, Positions t1);
   void begin_motion(Positions t0, Positions t1, Tests tests);
   void begin_motion(Positions t0, Positions t1, Tests tests, MovingTree& tree);
   void begin_proximity(Positions vertices, double distance, ProximitySearch& search);

@@ -16,6 +16,7 @@ Common::Common(std::shared_ptr<const Scene> of, const Options& wanted, int threa
       separations(*scene, wanted.minimum_separation),
       thickness(*scene, features),
       rules(*scene, wanted.accuracy, separations, wanted.features),
+      planes(*scene, separations, thickness),
       settled_(separations.version()) {
   require_some("features", wanted.features);
   if (wanted.worlds < 1 || wanted.worlds > Options::most_worlds)

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "backends/moving_tree.h"
+#include "backends/planes.h"
 #include "base/cancellation.h"
 #include "base/parallel.h"
 #include "base/profiler.h"
@@ -29,6 +30,7 @@ struct Common {
   SeparationTable separations;
   ThicknessTable thickness;
   PairRules rules;
+  Planes planes;
 
   // At the beginning of each call: applies separations that were set since the last one.
   void settle();

@@ -33,6 +33,10 @@ HPCCD_HD std::uint64_t hash_of(Kind kind, std::uint64_t a, std::uint64_t b, doub
   return mix(mix(mix(a + salt_of(kind)) ^ b) ^ bits_of(toc));
 }
 
+HPCCD_HD std::uint64_t hash_of_vertex_plane(std::uint32_t vertex, std::uint32_t plane, double toc) {
+  return mix(mix(mix(vertex + 0xa24baed4963ee407ULL) ^ plane) ^ bits_of(toc));
+}
+
 // The weight of a world's hash in the total hash: the same contacts in another world give another hash.
 HPCCD_HD std::uint64_t hash_weight(std::uint64_t world) { return 2 * world + 1; }
 

@@ -10,13 +10,25 @@
 namespace hpccd {
 namespace {
 
-// Feature numbers in sorting order: vertex and face, or both edges.
+// Feature numbers in sorting order: vertex and face, both edges, and so on.
 struct Key {
   std::uint64_t a, b;
   friend auto operator<=>(const Key&, const Key&) = default;
 };
 Key key_of(const std::array<std::uint32_t, 2>& vf) { return {vf[0], vf[1]}; }
+Key key_of(const std::array<std::uint32_t, 3>& ve) { return {ve[0], pack(ve[1], ve[2])}; }
 Key key_of(const std::array<std::uint32_t, 4>& ee) { return {pack(ee[0], ee[1]), pack(ee[2], ee[3])}; }
+
+// f(rows of a part, their times, rows of the step, their times) for each kind, in the order of the outputs.
+template <class F>
+void for_each_kind(F&& f) {
+  using Part = ContactsOfPart;
+  f(&Part::vf, &Part::vf_toc, &Contacts::vf, &Contacts::vf_toc);
+  f(&Part::ee, &Part::ee_toc, &Contacts::ee, &Contacts::ee_toc);
+  f(&Part::vp, &Part::vp_toc, &Contacts::vp, &Contacts::vp_toc);
+  f(&Part::vv, &Part::vv_toc, &Contacts::vv, &Contacts::vv_toc);
+  f(&Part::ve, &Part::ve_toc, &Contacts::ve, &Contacts::ve_toc);
+}
 
 struct Row {
   Key key;
@@ -55,11 +67,15 @@ std::vector<Row> rows_of_step(std::span<const ContactsOfPart> answers, Pairs Con
 }
 
 void check_rows(const ContactsOfPart& of) {
-  const std::size_t n = of.vf.size() + of.ee.size();
+  std::size_t n = 0;
+  bool times = true;
+  for_each_kind([&](auto pairs, auto toc, auto, auto) {
+    n += (of.*pairs).size();
+    times = times && (of.*pairs).size() == (of.*toc).size();
+  });
   const auto all_or_none = [n](const auto& places) { return places.empty() || places.size() == n; };
-  if (of.vf.size() != of.vf_toc.size() || of.ee.size() != of.ee_toc.size() || !all_or_none(of.points) ||
-      !all_or_none(of.normals) || !all_or_none(of.closest) || !all_or_none(of.vertices) || !all_or_none(of.weights) ||
-      !all_or_none(of.approach))
+  if (!times || !all_or_none(of.points) || !all_or_none(of.normals) || !all_or_none(of.closest) ||
+      !all_or_none(of.vertices) || !all_or_none(of.weights) || !all_or_none(of.approach))
     throw InvalidArgument("results: contacts of unequal lengths; give them as a detector returned them");
 }
 
@@ -67,57 +83,60 @@ double time_in_step(const ContactsOfPart& of, double toc) { return (of.part + to
 
 }  // namespace
 
-std::uint64_t hash_of_contacts(const ContactsOfPart& contacts) {
-  check_rows(contacts);
+std::uint64_t hash_of_contacts(const ContactsOfPart& of) {
+  check_rows(of);
   std::uint64_t sum = 0;
-  for (std::size_t i = 0; i < contacts.vf.size(); ++i) {
-    const auto [a, b] = key_of(contacts.vf[i]);
-    sum += hash_of(Kind::vertex_face, a, b, contacts.vf_toc[i]);
+  for (std::size_t i = 0; i < of.vf.size(); ++i)
+    sum += hash_of(Kind::vertex_face, of.vf[i][0], of.vf[i][1], of.vf_toc[i]);
+  const auto add_edges = [&](std::uint64_t a, std::uint64_t b, double toc) {
+    sum += hash_of(Kind::edge_edge, std::min(a, b), std::max(a, b), toc);
+  };
+  for (std::size_t i = 0; i < of.ee.size(); ++i) {
+    const auto& e = of.ee[i];
+    sum += hash_of(Kind::edge_edge, pack(e[0], e[1]), pack(e[2], e[3]), of.ee_toc[i]);
   }
-  for (std::size_t i = 0; i < contacts.ee.size(); ++i) {
-    const auto [a, b] = key_of(contacts.ee[i]);
-    sum += hash_of(Kind::edge_edge, a, b, contacts.ee_toc[i]);
-  }
+  for (std::size_t i = 0; i < of.vp.size(); ++i) sum += hash_of_vertex_plane(of.vp[i][0], of.vp[i][1], of.vp_toc[i]);
+  // Points are edges from a vertex to itself.
+  for (std::size_t i = 0; i < of.vv.size(); ++i)
+    add_edges(pack(of.vv[i][0], of.vv[i][0]), pack(of.vv[i][1], of.vv[i][1]), of.vv_toc[i]);
+  for (std::size_t i = 0; i < of.ve.size(); ++i)
+    add_edges(pack(of.ve[i][0], of.ve[i][0]), pack(of.ve[i][1], of.ve[i][2]), of.ve_toc[i]);
   return sum;
 }
 
 Contacts contacts_of_step(std::span<const ContactsOfPart> answers) {
   const StandardArithmetic arithmetic;
   for (const ContactsOfPart& answer : answers) check_rows(answer);
-  const std::vector<Row> of_vf = rows_of_step(answers, &ContactsOfPart::vf);
-  const std::vector<Row> of_ee = rows_of_step(answers, &ContactsOfPart::ee);
   Contacts step;
-  for (const Row& row : of_vf) {
-    step.vf.push_back(answers[row.answer].vf[row.at]);
-    step.vf_toc.push_back(time_in_step(answers[row.answer], answers[row.answer].vf_toc[row.at]));
-    step.first_toc = std::min(step.first_toc, step.vf_toc.back());
-  }
-  for (const Row& row : of_ee) {
-    step.ee.push_back(answers[row.answer].ee[row.at]);
-    step.ee_toc.push_back(time_in_step(answers[row.answer], answers[row.answer].ee_toc[row.at]));
-    step.first_toc = std::min(step.first_toc, step.ee_toc.back());
-  }
-  const auto add_places = [&](auto& places, auto from) {
-    for (const Row& row : of_vf)
-      if (const auto& of = answers[row.answer].*from; !of.empty()) places.push_back(of[row.at]);
-    for (const Row& row : of_ee)
-      if (const auto& of = answers[row.answer].*from; !of.empty())
-        places.push_back(of[answers[row.answer].vf.size() + row.at]);
+  const auto add_places = [&](const std::vector<Row>& rows, const std::vector<std::size_t>& first) {
+    const auto add = [&](auto& places, auto from) {
+      for (const Row& row : rows)
+        if (const auto& of = answers[row.answer].*from; !of.empty()) places.push_back(of[first[row.answer] + row.at]);
+    };
+    add(step.points, &ContactsOfPart::points), add(step.normals, &ContactsOfPart::normals);
+    add(step.closest, &ContactsOfPart::closest), add(step.vertices, &ContactsOfPart::vertices);
+    add(step.weights, &ContactsOfPart::weights);
+    // Per step, which takes as many times as long as a part.
+    for (const Row& row : rows)
+      if (const ContactsOfPart& of = answers[row.answer]; !of.approach.empty())
+        step.approach.push_back(of.approach[first[row.answer] + row.at] * of.parts);
   };
-  add_places(step.points, &ContactsOfPart::points);
-  add_places(step.normals, &ContactsOfPart::normals);
-  add_places(step.closest, &ContactsOfPart::closest);
-  add_places(step.vertices, &ContactsOfPart::vertices);
-  add_places(step.weights, &ContactsOfPart::weights);
-  add_places(step.approach, &ContactsOfPart::approach);
-  // Per step, which takes as many times as long as a part.
-  const auto rows = [&](const std::vector<Row>& of, std::size_t begin) {
-    for (std::size_t i = 0; i < of.size() && !step.approach.empty(); ++i)
-      step.approach[begin + i] *= answers[of[i].answer].parts;
-  };
-  rows(of_vf, 0), rows(of_ee, of_vf.size());
+  std::vector<std::size_t> first(answers.size());  // of this kind among the rows of each part
+  for_each_kind([&](auto pairs, auto toc, auto pairs_of_step, auto toc_of_step) {
+    const std::vector<Row> rows = rows_of_step(answers, pairs);
+    for (const Row& row : rows) {
+      const ContactsOfPart& of = answers[row.answer];
+      (step.*pairs_of_step).push_back((of.*pairs)[row.at]);
+      (step.*toc_of_step).push_back(time_in_step(of, (of.*toc)[row.at]));
+      step.first_toc = std::min(step.first_toc, (step.*toc_of_step).back());
+    }
+    add_places(rows, first);
+    for (std::size_t k = 0; k < answers.size(); ++k) first[k] += (answers[k].*pairs).size();
+  });
   ContactsOfPart features;
-  features.vf = step.vf, features.vf_toc = step.vf_toc, features.ee = step.ee, features.ee_toc = step.ee_toc;
+  for_each_kind([&](auto pairs, auto toc, auto pairs_of_step, auto toc_of_step) {
+    features.*pairs = step.*pairs_of_step, features.*toc = step.*toc_of_step;
+  });
   step.hash = hash_of_contacts(features);
   return step;
 }

@@ -14,6 +14,12 @@ struct ContactsOfPart {
   std::span<const double> vf_toc;
   std::span<const std::array<std::uint32_t, 4>> ee;
   std::span<const double> ee_toc;
+  std::span<const std::array<std::uint32_t, 2>> vp;
+  std::span<const double> vp_toc;
+  std::span<const std::array<std::uint32_t, 2>> vv;
+  std::span<const double> vv_toc;
+  std::span<const std::array<std::uint32_t, 3>> ve;
+  std::span<const double> ve_toc;
   std::span<const std::array<double, 3>> points, normals;
   std::span<const std::array<std::array<double, 3>, 2>> closest;
   std::span<const std::array<std::uint32_t, 4>> vertices;

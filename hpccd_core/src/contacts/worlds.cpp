@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "contacts/hash.h"
+#include "contacts/places.h"
 
 namespace hpccd {
 namespace {
@@ -80,6 +81,45 @@ void join_worlds(std::vector<Contacts>& worlds, ThreadPool& pool, Contacts& all)
       worlds[k] = {};
     }
   });
+}
+
+void drop_worlds(Contacts& c, const std::vector<char>& dropped) {
+  if (dropped.size() == 1) {
+    if (dropped[0]) c = {};
+    return;
+  }
+  WorldSlices& s = c.slices;
+  const std::size_t n = c.vf.size();
+  const auto keep = [&](auto& rows, bool vf, bool ee) {
+    if (rows.empty()) return;
+    auto to = rows.begin();
+    const auto move = [&](const std::vector<std::uint64_t>& begin, std::size_t offset) {
+      for (std::size_t k = 0; k < dropped.size(); ++k)
+        if (!dropped[k])
+          to = std::move(rows.begin() + static_cast<std::ptrdiff_t>(offset + begin[k]),
+                         rows.begin() + static_cast<std::ptrdiff_t>(offset + begin[k + 1]), to);
+    };
+    if (vf) move(s.vf, 0);
+    if (ee) move(s.ee, vf ? n : 0);
+    rows.erase(to, rows.end());
+  };
+  for_each_output(all_outputs, [&](auto list) { keep(c.*list, true, true); });
+  keep(c.vf, true, false), keep(c.vf_toc, true, false), keep(c.ee, false, true), keep(c.ee_toc, false, true);
+  for (std::vector<std::uint64_t>* begin : {&s.vf, &s.ee}) {
+    std::uint64_t last = 0, lost = 0;
+    for (std::size_t k = 0; k < dropped.size(); ++k) {
+      const std::uint64_t rows = (*begin)[k + 1] - last;
+      last = (*begin)[k + 1];
+      if (dropped[k]) lost += rows;
+      (*begin)[k + 1] -= lost;
+    }
+  }
+  c.hash = 0, c.first_toc = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < dropped.size(); ++k) {
+    if (dropped[k]) s.hashes[k] = 0, c.first_tocs[k] = std::numeric_limits<double>::infinity();
+    c.hash += hash_weight(k) * s.hashes[k];
+    c.first_toc = std::min(c.first_toc, c.first_tocs[k]);
+  }
 }
 
 Intersections join_worlds(std::vector<Intersections>& worlds, ThreadPool& pool) {

@@ -14,4 +14,7 @@ namespace hpccd {
 void join_worlds(std::vector<Contacts>& worlds, ThreadPool& pool, Contacts& all);
 Intersections join_worlds(std::vector<Intersections>& worlds, ThreadPool& pool);
 
+// Removes the vertex-face and edge-edge contacts of some worlds, from contacts of one world or of many.
+void drop_worlds(Contacts& contacts, const std::vector<char>& dropped);
+
 }  // namespace hpccd

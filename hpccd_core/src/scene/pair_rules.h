@@ -48,6 +48,8 @@ class PairRules {
   bool enabled_by_table(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     return mesh_a == mixed_meshes || mesh_b == mixed_meshes || tested_.in_table(mesh_a, mesh_b);
   }
+  // As enabled(), for two meshes: false for planes.
+  bool tested(std::uint32_t mesh_a, std::uint32_t mesh_b) const { return tested_.of(mesh_a, mesh_b); }
   // The rule of an enabled pair.
   Rule rule(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     Rule rule = one_rule_ ? *one_rule_ : rules_.of(mesh_a, mesh_b);

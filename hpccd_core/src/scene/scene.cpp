@@ -5,6 +5,7 @@
 #include "base/names.h"
 #include "base/standard_arithmetic.h"
 #include "hpccd/hpccd.h"
+#include "scene/plane.h"
 #include "scene/tested_features.h"
 #include "scene/thickness.h"
 
@@ -86,6 +87,12 @@ void Scene::set_thickness(std::uint32_t mesh, std::span<const double> thickness)
   known(mesh, mesh);
   check_thickness(meshes_[mesh], thickness);
   meshes_[mesh].thickness.assign(thickness.begin(), thickness.end());
+std::uint32_t Scene::add_plane(std::string name, const Plane& plane, bool is_static) {
+  const StandardArithmetic arithmetic;  // otherwise a normal of denormal numbers might pass as 0
+  check_plane(plane);
+  const std::uint32_t number = add_mesh(std::move(name), {}, 0, {.self_collision = false, .is_static = is_static});
+  meshes_[number].plane = plane;
+  return number;
 }
 
 Scene::Pair Scene::known(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
@@ -119,6 +126,7 @@ void Scene::set_features(std::uint32_t mesh_a, std::uint32_t mesh_b, TestedFeatu
 bool Scene::pair_enabled(std::uint32_t a, std::uint32_t b) const {
   const MeshOptions &oa = meshes_[a].options, &ob = meshes_[b].options;
   if (a == b && !oa.self_collision) return false;
+  if (meshes_[a].plane && meshes_[b].plane) return false;
   if (oa.is_static && ob.is_static) return false;
   return !ignored_.contains(ordered(a, b));
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pairs of meshes that are tested.
+// The pairs of meshes that are tested. Planes have no features: they are tested apart from all meshes
+// (backends/planes.h), and no pair of theirs counts here.
 #pragma once
 
 #include <cstdint>
@@ -15,13 +16,13 @@ class TestedPairs {
   explicit TestedPairs(const Scene& scene);
 
   bool all() const { return all_; }
-  // Whether a table of all pairs exists, or none is needed.
+  // Whether a table of all pairs exists, or none is needed. If all() is true, the table is not read.
   bool by_table() const { return all_ || not_ignored_.has_all(); }
   bool in_table(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     return all_ || not_ignored_.in_table(mesh_a, mesh_b);
   }
   bool of(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
-    if (by_table()) return in_table(mesh_a, mesh_b);
+    if (not_ignored_.has_all()) return not_ignored_.in_table(mesh_a, mesh_b);
     return by_meshes(mesh_a, mesh_b) && not_ignored_.of(mesh_a, mesh_b);
   }
   // Pairs of two meshes or of one, each once.
@@ -33,10 +34,10 @@ class TestedPairs {
   }
 
  private:
-  enum : unsigned char { is_static = 1, within = 2 };
+  enum : unsigned char { is_static = 1, within = 2, is_plane = 4 };
   // By the options of the meshes.
   bool by_meshes(std::uint32_t a, std::uint32_t b) const {
-    return !(meshes_[a] & meshes_[b] & is_static) && (a != b || meshes_[a] & within);
+    return !(meshes_[a] & meshes_[b] & is_static) && !((meshes_[a] | meshes_[b]) & is_plane) && (a != b || meshes_[a] & within);
   }
 
   std::vector<unsigned char> meshes_;
