@@ -299,6 +299,30 @@ def test_separations_and_ignored_pairs():
     ]
 
 
+def test_thickness_counts():
+    """Of each vertex the greatest of its faces, in the separation and in distances."""
+    scene = hc.Scene()
+    scene.add_mesh("cloth", [[0, 1, 2], [2, 1, 3]], thickness=[0.5, 0.125])
+    scene.add_mesh("rope", edges=[[0, 1]], thickness=1.0)
+    scene.add_plane("floor")
+    scene.set_separation("cloth", "floor", 0.25)
+    detector = hc.Detector(scene, outputs=("closest",))
+    heights = np.array([0.75, 0.75, 0.875, 0.375, 1.0, 1.125])
+    x = np.pad(heights[:, None], ((0, 0), (2, 0)))
+    assert detector.detect(x, x).vp.tolist() == [[0, 0], [1, 0], [3, 0], [4, 0]]
+    x[3, 2] = 0.4
+    assert detector.detect(x, x).vp.tolist() == [[0, 0], [1, 0], [4, 0]]
+    near = detector.proximity(x, 0.25)
+    assert near.vp.tolist() == [[0, 0], [1, 0], [4, 0], [5, 0]]
+    assert near.vp_distance.tolist() == [0.25, 0.25, 0, 0.125]
+    assert near.closest[-4].tolist() == [[0, 0, 0.75], [0, 0, 0]]
+    by_pair = {(gap.mesh_a, gap.mesh_b): gap for gap in detector.distances(x)}
+    assert (by_pair["cloth", "floor"].distance, by_pair["cloth", "floor"].features) == (0.25, (0, 0))
+    assert (by_pair["rope", "floor"].distance, by_pair["rope", "floor"].features) == (0, (4, 0))
+    detector.set_thickness("cloth", 0.0)
+    assert detector.detect(x, x - [0, 0, 0.25]).vp.tolist() == [[3, 0], [4, 0], [5, 0]]
+
+
 @pytest.mark.parametrize("static_plane", [True, False])
 def test_static_meshes_and_planes(static_plane):
     scene = hc.Scene()

@@ -87,6 +87,8 @@ void Scene::set_thickness(std::uint32_t mesh, std::span<const double> thickness)
   known(mesh, mesh);
   check_thickness(meshes_[mesh], thickness);
   meshes_[mesh].thickness.assign(thickness.begin(), thickness.end());
+}
+
 std::uint32_t Scene::add_plane(std::string name, const Plane& plane, bool is_static) {
   const StandardArithmetic arithmetic;  // otherwise a normal of denormal numbers might pass as 0
   check_plane(plane);
