@@ -66,7 +66,7 @@ def _require_device(backend: str, method: str, planes: bool) -> None:
     if method != "default":
         raise ValueError(f"results: 'device' is not offered by method {method!r}, which runs on CPUs; use 'default'")
     if planes:
-        raise ValueError("results: 'device' is not offered for scenes with planes, which are tested on the host; use 'host'")
+        raise ValueError("results: 'device' is not offered for planes, which the host tests; use 'host'")
 
 
 class Detector(

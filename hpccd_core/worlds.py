@@ -52,8 +52,8 @@ def _equal(a: Any, b: Any) -> bool:
 class Slices(ComparedByRows):
     """Rows of W worlds; arrays that a result does not have are empty.
 
-    vf, ee, ef, vp, vv, ve: (W+1,) int64, where the rows of each world begin, and their total. hashes: (W,) uint64, of each world's
-    rows. first_tocs: (W,) float64.
+    vf, ee, ef, vp, vv, ve: (W+1,) int64, where the rows of each world begin, and their total. hashes: (W,) uint64, of
+    each world's rows. first_tocs: (W,) float64.
     """
 
     vf: NDArray[np.int64]

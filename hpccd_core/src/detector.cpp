@@ -231,8 +231,9 @@ struct Detector::Impl {
       Detection d = compute(in_place ? Backend::cpu : picked, t0, t1);
       Counts of_planes = with_planes([&](const Planes& planes) {
         const Options& o = options();
-        return Counts{{"vp_contacts", planes.add_contacts(d.contacts, backends().on_host(t0, 0), backends().on_host(t1, 1),
-                                                          o.report, Outputs::of_contacts(o), common.pool)}};
+        return Counts{
+            {"vp_contacts", planes.add_contacts(d.contacts, backends().on_host(t0, 0), backends().on_host(t1, 1),
+                                                o.report, Outputs::of_contacts(o), common.pool)}};
       });
       note(picked, d.computed_by, d.contacts.vf.size(), d.contacts.ee.size());
       found->merge(of_planes);

@@ -151,8 +151,7 @@ void Planes::find(const Query& query, std::size_t begin, std::size_t end, std::v
               for (std::size_t from = first; from < last; from += block)
                 test_block(from, std::min(block, last - from), mesh, plane, h);
             });
-  if (planes_.size() > 1)
-    std::ranges::sort(hits, {}, [](const Hit& h) { return std::pair(h.vertex, h.plane); });
+  if (planes_.size() > 1) std::ranges::sort(hits, {}, [](const Hit& h) { return std::pair(h.vertex, h.plane); });
 }
 
 Planes::Hits Planes::find(const Query& query, ThreadPool& pool) const {
@@ -311,9 +310,8 @@ void Planes::add_gaps(std::vector<Gap>& gaps, Positions vertices, std::size_t wo
     const auto others = gaps.begin() + static_cast<std::ptrdiff_t>(k * n_others);
     std::sort(planes, planes + static_cast<std::ptrdiff_t>(n),
               [&](const Gap& a, const Gap& b) { return key(a) < key(b); });
-    std::merge(others, others + static_cast<std::ptrdiff_t>(n_others), planes,
-               planes + static_cast<std::ptrdiff_t>(n), std::back_inserter(all),
-               [&](const Gap& a, const Gap& b) { return key(a) < key(b); });
+    std::merge(others, others + static_cast<std::ptrdiff_t>(n_others), planes, planes + static_cast<std::ptrdiff_t>(n),
+               std::back_inserter(all), [&](const Gap& a, const Gap& b) { return key(a) < key(b); });
   }
   gaps = std::move(all);
 }

@@ -176,8 +176,9 @@ std::optional<double> HalfSpace::time(const Vec3<double>& x0, const Vec3<double>
     // Each value has an error below 2^-50 of its bound in double precision: DoubleDouble has relative errors below
     // 2^-102 of the same sum of magnitudes, and may lose 2^-1070 too.
     const DoubleDouble f0 = twice_double(normal_, offset_, x0), f1 = twice_double(normal_, offset_, x1);
-    const DoubleDouble square = (detail::two_product(normal_.x, normal_.x) + detail::two_product(normal_.y, normal_.y)) +
-                                detail::two_product(normal_.z, normal_.z);
+    const DoubleDouble square =
+        (detail::two_product(normal_.x, normal_.x) + detail::two_product(normal_.y, normal_.y)) +
+        detail::two_product(normal_.z, normal_.z);
     const DoubleDouble reach = DoubleDouble(separation_) * square_root(square), way = f0 - f1;
     const double magnitude = std::fabs(normal_.x * x0.x) + std::fabs(normal_.y * x0.y) + std::fabs(normal_.z * x0.z) +
                              std::fabs(normal_.x * x1.x) + std::fabs(normal_.y * x1.y) + std::fabs(normal_.z * x1.z) +
@@ -198,8 +199,8 @@ double HalfSpace::distance(const Vec3<double>& x) const {
   if (axis_ >= 0) return value(x.x, x.y, x.z).f;
   if (bounds_hold_) {
     const DoubleDouble f = twice_double(normal_, offset_, x);
-    const double magnitude = std::fabs(normal_.x * x.x) + std::fabs(normal_.y * x.y) + std::fabs(normal_.z * x.z) +
-                             std::fabs(offset_);
+    const double magnitude =
+        std::fabs(normal_.x * x.x) + std::fabs(normal_.y * x.y) + std::fabs(normal_.z * x.z) + std::fabs(offset_);
     if (0x1p-95 * magnitude + 0x1p-1000 < 0x1p-50 * std::fabs(f.high)) return f.high / length_;
   }
   const ExactValues v = exact_values(plane_, x, x);

@@ -59,13 +59,13 @@ class HalfSpace {
   double separation_;
   // Scaled by one power of two, so that the largest coordinate of the normal lies in [1, 2).
   Vec3<double> normal_, unit_;
-  double offset_, length_;      // length_: of the normal, rounded
-  bool bounds_hold_ = true;     // false: a number has lost bits in scaling, or is beyond the range of doubles
+  double offset_, length_;   // length_: of the normal, rounded
+  bool bounds_hold_ = true;  // false: a number has lost bits in scaling, or is beyond the range of doubles
   double relative_ = 0x1p-50, lost_ = 0x1p-1070;
-  double least_, most_;         // bounds on separation * |normal|
-  double far_;                  // above most_ and the parts of the error that are the same for all vertices
+  double least_, most_;  // bounds on separation * |normal|
+  double far_;           // above most_ and the parts of the error that are the same for all vertices
   int axis_ = -1;
-  double side_ = 1;             // for an axis: the normal's coordinate, 1 or -1
+  double side_ = 1;  // for an axis: the normal's coordinate, 1 or -1
 };
 
 }  // namespace hpccd

@@ -37,7 +37,8 @@ class TestedPairs {
   enum : unsigned char { is_static = 1, within = 2, is_plane = 4 };
   // By the options of the meshes.
   bool by_meshes(std::uint32_t a, std::uint32_t b) const {
-    return !(meshes_[a] & meshes_[b] & is_static) && !((meshes_[a] | meshes_[b]) & is_plane) && (a != b || meshes_[a] & within);
+    return !(meshes_[a] & meshes_[b] & is_static) && !((meshes_[a] | meshes_[b]) & is_plane) &&
+           (a != b || meshes_[a] & within);
   }
 
   std::vector<unsigned char> meshes_;
