@@ -157,6 +157,11 @@ __device__ __forceinline__ SnapshotReach stage_corners(const LaunchParams<T>& pa
     store(&s.slanted[lane_number()], slanted);
   }
   __syncwarp();
+  if (params.thickness.of_vertex)  // the largest of the leaf: one for each corner would cost registers
+    for (int d = 16; d > 0; d /= 2) {
+      reach.axes = fmaxf(reach.axes, __shfl_xor_sync(all_lanes, reach.axes, d));
+      reach.slanted = fmaxf(reach.slanted, __shfl_xor_sync(all_lanes, reach.slanted, d));
+    }
   return {__shfl_sync(all_lanes, reach.axes, 0), __shfl_sync(all_lanes, reach.slanted, 0)};
 }
 
