@@ -273,3 +273,33 @@ def test_no_vertices_and_nothing_in_the_way():
     meshes = stack(2, 6)
     free = detector_of(meshes).collision_free_motion(meshes.vertices_t0, meshes.vertices_t0 + 1)
     assert (free.factors == 1).all() and repr(free) == "CollisionFreeMotion(72 vertices, mean factor 1, 0 stuck)"
+
+
+def test_candidates_of_one_kind_after_both_kinds():
+    """Lists of vertices and faces that an earlier motion filled, and this one leaves empty: two threads joined them at
+    once, which freed their memory twice."""
+    n = 400
+    scene = hc.Scene()
+    scene.add_mesh("plates", np.arange(3 * n).reshape(-1, 3), self_collision=False)
+    scene.add_mesh("pins", n_vertices=n)
+    for name in ("rods", "bars"):
+        scene.add_mesh(name, edges=np.arange(2 * n).reshape(-1, 2), self_collision=False)
+    at = 3.0 * np.arange(n)[:, None, None] * [1, 0, 0]
+    parts = (
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0]],
+        [[0.2, 0.2, 0.5]],
+        [[0, 5, 0], [1, 5, 0]],
+        [[0.5, 4.5, 0.5], [0.5, 5.5, 0.5]],
+    )
+    start = np.concatenate([(at + part).reshape(-1, 3) for part in parts])
+    ends = []
+    for way in (-1, 1):  # of the pins; the bars always move onto the rods
+        end = start.copy()
+        end[3 * n : 4 * n, 2] += way
+        end[6 * n :, 2] -= 1
+        ends.append(end)
+    one, two = (hc.Detector(scene, backend="cpu", threads=threads) for threads in (1, 2))
+    expected = [one.collision_free_motion(start, end) for end in ends]
+    assert [(motion.factors < 1).sum() for motion in expected] == [3 * n, 2 * n]
+    for turn in range(400):
+        assert two.collision_free_motion(start, ends[turn % 2]) == expected[turn % 2]

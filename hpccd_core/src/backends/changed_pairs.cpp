@@ -40,6 +40,7 @@ void ChangedPairs::join(ThreadPool& pool) {
   std::vector<std::size_t> sizes(candidates_.size());
   for (auto& groups : of_workers_)
     for (PairGroup& group : groups) {
+      if (group.first.empty()) continue;  // of an earlier search; two threads would swap it with one empty target
       std::size_t to = 0;
       while (to < candidates_.size() && !candidates_[to].pairs.tested_like(group)) ++to;
       if (to == candidates_.size())
