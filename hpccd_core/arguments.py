@@ -8,6 +8,7 @@ import inspect
 import math
 import operator
 import struct
+import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING, Any, NoReturn, SupportsIndex, TypeGuard, TypeVar
@@ -70,8 +71,15 @@ def hide_unnamed(function: Function) -> Function:
     signature = inspect.signature(function)
     extra = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
     parameters = [p.replace(annotation=p.empty) for p in signature.parameters.values() if p.kind not in extra]
-    function.__signature__ = signature.replace(parameters=parameters, return_annotation=signature.empty)  # type: ignore[attr-defined]
+    function.__signature__ = _Wrapped(parameters)  # type: ignore[attr-defined]
     return function
+
+
+class _Wrapped(inspect.Signature):
+    """A signature that is printed in lines of at most 200 characters: that of Detector would be one of 320."""
+
+    def __str__(self) -> str:
+        return textwrap.fill(super().__str__(), 200, subsequent_indent="    ", break_long_words=False)
 
 
 def reject_unnamed(query: str, remedy: str) -> NoReturn:

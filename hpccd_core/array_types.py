@@ -15,5 +15,7 @@ Positions = ArrayLike | Mapping[str, ArrayLike] | DeviceArrayLike
 MeshName = str | int
 #: A CUDA stream: a cudaStream_t as int, or an object with .ptr (CuPy) or .cuda_stream (PyTorch, Warp).
 Stream = object
+#: The option `detail`: of all meshes, or by mesh.
+Detail = float | Mapping[str | int, float | Mapping[str, object]]
 
-__all__ = ["ArrayLike", "DeviceArrayLike", "MeshName", "Positions", "Stream"]
+__all__ = ["ArrayLike", "Detail", "DeviceArrayLike", "MeshName", "Positions", "Stream"]

@@ -28,6 +28,10 @@ def toc_gradients(
         return (1 - toc)[:, None, None] * arms / speed, toc[:, None, None] * arms / speed
 
 
+_NO_EF = np.empty((0, 3), np.uint32)
+_NO_EF.flags.writeable = False
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Contacts(PairsOfWorlds, WithSides):
     """Contacts of one step in canonical order: N vertex-face rows, then M edge-edge rows.
@@ -94,6 +98,7 @@ class Contacts(PairsOfWorlds, WithSides):
     first_toc: float
     hash: int
     outputs: dict[str, NDArray[Any]] = dataclasses.field(default_factory=dict)
+    ef: Indices = dataclasses.field(default_factory=lambda: _NO_EF)
     slices: Slices | None = dataclasses.field(default=None, repr=False)
     layout: MeshLayout | None = dataclasses.field(default=None, repr=False, compare=False)
     vp: Indices = dataclasses.field(default_factory=lambda: NO_PAIRS["vp"])
@@ -102,6 +107,16 @@ class Contacts(PairsOfWorlds, WithSides):
     vv_toc: NDArray[np.float64] = dataclasses.field(default_factory=lambda: NO_VALUES)
     ve: Indices = dataclasses.field(default_factory=lambda: NO_PAIRS["ve"])
     ve_toc: NDArray[np.float64] = dataclasses.field(default_factory=lambda: NO_VALUES)
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """(N+M,) float64, vertex-face first: what the separation of each pair grew by, because its faces are coarse.
+
+        It is the sum of the deviations of both sides from the meshes of the scene, in the unit of the coordinates; zero
+        without `detail`.
+        """
+        bounds = self.outputs.get("bounds")
+        return np.zeros(len(self) - len(self.ef)) if bounds is None else bounds
 
     @property
     def points(self) -> NDArray[np.float64]:
@@ -234,8 +249,16 @@ class Contacts(PairsOfWorlds, WithSides):
             return self
         return Contacts(**self._fields_of(k, "toc"), first_toc=float(self.slices.first_tocs[k]))
 
+    def _pairs(self) -> dict[str, Indices]:
+        pairs = super()._pairs()
+        return {**pairs, "ef": self.ef} if len(self.ef) else pairs
+
+    def __len__(self) -> int:
+        return super().__len__() + len(self.ef)
+
     def __repr__(self) -> str:
-        return f"Contacts({self._counts()}, first at {self.first_toc:.6g})"
+        crossing = f", {len(self.ef)} edge-face" if len(self.ef) else ""
+        return f"Contacts({self._counts()}{crossing}, first at {self.first_toc:.6g})"
 
     @classmethod
     def none(cls, worlds: int | None = None, outputs: Iterable[str] = (), layout: MeshLayout | None = None) -> Contacts:
@@ -276,3 +299,4 @@ class Contacts(PairsOfWorlds, WithSides):
 for _kind in ("vp", "vv", "ve"):
     setattr(Contacts, _kind, NO_PAIRS[_kind])
     setattr(Contacts, f"{_kind}_toc", NO_VALUES)
+Contacts.ef = _NO_EF  # of results of the core, which have none

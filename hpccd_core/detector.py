@@ -13,17 +13,20 @@ from typing import TYPE_CHECKING, Any, Literal, NoReturn, cast, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _core, arguments, device_arrays
-from .array_types import ArrayLike, MeshName, Positions, Stream
+from . import _core, arguments, detail_options, device_arrays
+from .array_types import ArrayLike, Detail, MeshName, Positions, Stream
 from .contacts import Contacts
+from .detail_core import DetailedCore
 from .device_results import DeviceContacts, DeviceIntersections, DeviceProximity
 from .devices import backends, gpu_status
+from .mesh_layout import Indices
 from .motion_queries import MotionQueries
 from .options import (
     ACCURACIES,
     ALL_OUTPUTS,
     BACKENDS,
     METHODS,
+    REFINE,
     REPORTS,
     RESULTS,
     SIMD,
@@ -32,6 +35,7 @@ from .options import (
     Feature,
     Method,
     Output,
+    Refine,
     Report,
     Results,
     Simd,
@@ -108,10 +112,10 @@ class Detector(
         CPU instruction set. Results are the same.
     restructure : bool
         Whether "published" and "naive" restructure their hierarchies.
-    hybrid_segments, hybrid_segment_pairs : int
-        Backend "hybrid": segments of the queue between CPU threads and GPUs, and pairs of leaves in each.
-    gpus : int
-        Backend "hybrid": number of GPUs; 0 for all.
+    detail, refine : float or dict, and {"none", "neighbours"}
+        Detect on coarse faces with a proven bound: 0.1 of all, by mesh, or to an error; refine: `docs/detail.md`.
+    hybrid_segments, hybrid_segment_pairs, gpus : int
+        Backend "hybrid": segments of the queue between CPU threads and GPUs, pairs of leaves in each, GPUs (0: all).
 
     Raises
     ------
@@ -205,6 +209,8 @@ class Detector(
         hybrid_segments: int = 128,
         hybrid_segment_pairs: int = 2048,
         gpus: int = 0,
+        detail: Detail | None = None,
+        refine: Refine = "none",
         **unknown: Any,
     ) -> None:
         if not isinstance(scene, Scene):
@@ -231,6 +237,9 @@ class Detector(
         self.method = arguments.choice("method", method, METHODS)
         if results == "device":
             _require_device(backend, method, len(scene.layout.planes) > 0)
+        self.refine = arguments.choice("refine", refine, REFINE)
+        if detail is None and refine != "none":
+            raise ValueError("refine: is for coarse meshes; give detail too, as in detail=0.1")
         self._backend = backend
         self._outputs = arguments.output_names(outputs)
         self.features = arguments.feature_names(features)
@@ -274,11 +283,28 @@ class Detector(
         options.features = _core.TestedFeatures("vertex_face" in self.features, "edge_edge" in self.features)
         options.results_on_device = results == "device"
         options.worlds = self.worlds or 1
-        self._core = _core.Detector(scene._core, options)
+        self._detailed: DetailedCore | None = None
+        if detail is None:
+            self._core = _core.Detector(scene._core, options)
+        else:
+            self._detailed = self._core = self._with_detail(scene, options, detail)
         self._stepping = threading.RLock()  # of the positions of the last step
         self._last: NDArray[Any] | None = None
         self._last_on_device = device_arrays.LastStep()
         self._complete = True
+
+    def _with_detail(self, scene: Scene, options: _core.Options, detail: object) -> Any:
+        """The core of coarse meshes. Raises ValueError for options that it does not have."""
+        for name, given in (("worlds", self.worlds is not None), ("results", self.results == "device")):
+            if given:
+                raise ValueError(
+                    f"{name}: not offered with detail; use one world and results='host', or leave detail out"
+                )
+        layout = self._layout
+        counts = np.diff(layout.face_offsets).tolist()
+        details = detail_options.of_meshes(detail, layout.mesh_names, layout.vertex_counts, counts)
+        tested = "vertex_face" in self.features, "edge_edge" in self.features
+        return DetailedCore(scene, options, details, self.refine == "neighbours", self.report, tested)
 
     def __setattr__(self, name: str, value: object) -> None:
         if name[0] != "_" and self._complete and name in _OPTIONS:
@@ -324,6 +350,8 @@ class Detector(
             raise TypeError("vertices: the last step was a device array; give another one, or call reset() first")
         # Checked, used and kept as it is now, whatever the caller writes there meanwhile.
         end = arguments.vertices("vertices", vertices, self._shape, self._layout).copy()
+        if self._detailed is not None:
+            self._detailed.owns(end)
         if self._last is None and self.results == "host":
             arguments.usable("vertices", end)
             contacts: Any = self._no_contacts()
@@ -424,6 +452,11 @@ class Detector(
         """
         number = arguments.mesh_number("plane", plane, self._mesh_numbers)
         self._core.set_plane(number, arguments.vector("normal", normal), arguments.real("offset", offset))
+
+    @property
+    def faces(self) -> Indices:
+        """(F, 3) uint32: faces of the last call by scene-wide vertices; with `detail`, the coarse ones first."""
+        return self._faces if self._detailed is None else self._detailed.faces()
 
     def cancel(self) -> None:
         """End the use of this detector, from any thread and without waiting.

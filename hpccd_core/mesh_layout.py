@@ -66,6 +66,8 @@ class Sides:
                 continue
             of_b = faces if kind in ("vf", "ef") else vertices
             localise(rows[:, split:], of_b, self.mesh_b[of_kind], self.local_b[of_kind])
+        if len(faces) > len(vertices):  # coarse faces of each mesh, then its own
+            np.remainder(self.mesh_b, len(layout.mesh_names), out=self.mesh_b)
         return self
 
 

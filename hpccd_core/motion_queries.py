@@ -187,7 +187,11 @@ class MotionQueries(Generic[MotionResult, StepResult]):
     def _contacts(self, found: Any) -> Any:
         if self.results == "device":
             return device_results.contacts_of(found, self._outputs, self._layout)
-        return result_of(Contacts, with_outputs(found, self._outputs), self._layout)
+        layout, bounds = found.pop("layout", self._layout), found.pop("bounds", None)
+        found = with_outputs(found, self._outputs)
+        if bounds is not None:
+            found["outputs"]["bounds"] = bounds
+        return result_of(Contacts, found, layout)
 
     def _of_motion(
         self, query: str, vertices_t0: object, vertices_t1: object, stream: object = None, *more: object

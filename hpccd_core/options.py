@@ -8,6 +8,7 @@ Backend = Literal["auto", "cpu", "hybrid", "gpu"]
 Feature = Literal["vertex_face", "edge_edge"]
 Method = Literal["default", "published", "naive", "front"]
 Output = Literal["points", "normals", "closest", "weights", "directions"]
+Refine = Literal["none", "neighbours"]
 Report = Literal["all", "first", "any"]
 Results = Literal["host", "device"]
 Simd = Literal["auto", "scalar", "avx2", "avx512", "neon"]
@@ -19,6 +20,7 @@ METHODS: tuple[str, ...] = get_args(Method)
 ALL_OUTPUTS: tuple[str, ...] = get_args(Output)
 #: Those of contacts. Intersections have points and directions.
 OUTPUTS: tuple[str, ...] = ALL_OUTPUTS[:4]
+REFINE: tuple[str, ...] = get_args(Refine)
 REPORTS: tuple[str, ...] = get_args(Report)
 RESULTS: tuple[str, ...] = get_args(Results)
 SIMD: tuple[str, ...] = get_args(Simd)

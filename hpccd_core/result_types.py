@@ -4,13 +4,15 @@
 from typing import TYPE_CHECKING, TypedDict
 
 from .contacts import Contacts
-from .options import Accuracy, Backend, Feature, Method, Output, Report, Simd
+from .options import Accuracy, Backend, Feature, Method, Output, Refine, Report, Simd
 from .proximity import Gap, Intersections, Proximity
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from typing_extensions import TypeVar  # with a default, so that `Detector` alone means that of the host
+
+    from .array_types import Detail
 else:
     from typing import TypeVar as _TypeVar
 
@@ -42,3 +44,5 @@ class Options(TypedDict, total=False):
     hybrid_segment_pairs: int
     gpus: int
     features: "Feature | Iterable[Feature]"
+    detail: "Detail"
+    refine: Refine

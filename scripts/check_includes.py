@@ -14,8 +14,8 @@ import sys
 from pathlib import Path
 
 # The direction of the data. Files outside the folders (detector.cpp, bindings.cpp) come last.
-FOLDERS = ["base", "rigid", "scene", "bvh", "elementary", "traverse", "contacts", "solid", "paper", "gpu", "hybrid"]
-FOLDERS += ["backends"]
+FOLDERS = ["base", "rigid", "scene", "bvh", "detail", "elementary", "traverse", "contacts", "solid", "paper"]
+FOLDERS += ["gpu", "hybrid", "backends"]
 TOP = "the files beside the folders"
 ORDER = [*FOLDERS, TOP]
 PUBLIC = "hpccd"  # include/hpccd: the public interface, for all

@@ -8,6 +8,7 @@ set(hpccd_sources
   src/scene/scene.cpp src/scene/separation_table.cpp src/scene/thickness.cpp
   src/scene/static_meshes.cpp src/scene/tested_pairs.cpp
   src/bvh/build.cpp src/bvh/motion_bounds.cpp src/bvh/refit.cpp src/bvh/split.cpp src/bvh/squeezed_axis.cpp
+  src/detail/patches.cpp
   src/elementary/batch.cpp src/elementary/distance/distance_batch.cpp src/elementary/exact/contact.cpp
   src/elementary/exact/distance.cpp src/elementary/exact/gap_in_motion.cpp
   src/elementary/exact/intersection.cpp src/elementary/exact/separation.cpp

@@ -6,6 +6,7 @@
 
 #include "base/simd.h"
 #include "base/standard_arithmetic.h"
+#include "bindings_detail.h"
 #include "bindings_device.h"
 #include "bindings_rigid.h"
 #include "contacts/contours.h"
@@ -408,6 +409,7 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
   bind_device_array(m);
   bind_prepared(m);
   bind_rigid(m);
+  bind_detail(m);
 
   py::class_<Options>(m, "Options")
       .def(py::init<>())
