@@ -14,7 +14,7 @@ from hpccd_core.contacts import toc_gradients
 from hpccd_core.results import OUTPUT_ARRAYS
 from hpccd_ros.client.names import belongs, check
 from hpccd_ros.detect.layout import Layout
-from hpccd_ros.detect.separation import Separation
+from hpccd_ros.detect.separation import Separation, Thickness
 from hpccd_ros.middleware import contact_messages, result_fields
 from hpccd_ros.middleware.contact_messages import SceneContacts
 from hpccd_ros.middleware.result_fields import read_features
@@ -49,13 +49,14 @@ class ContactArrays:
     mesh_names : tuple of str
         Meshes of the scene.
     n_vertex_face, n_edge_edge, n_edge_face : int
-        Number of contacts of each kind, in this order. Edge-face contacts come only from query ``intersections``.
+        Number of contacts of each kind, in this order. Edge-face contacts come from query ``intersections``.
     mesh_a, mesh_b : ndarray, shape (N,), uint32
         The mesh of each side: indices into `mesh_names`.
     features_a : ndarray, shape (N, 2), uint32
         Side a, of `mesh_a`: vertex and ``ContactArray.NONE``, or both vertices of the edge.
     features_b : ndarray, shape (N, 2), uint32
-        Side b, of `mesh_b`: face and ``ContactArray.NONE``, or both vertices of the edge.
+        Side b, of `mesh_b`: face and ``ContactArray.NONE``, both vertices of the edge, a point and ``NONE``, or twice
+        ``NONE`` for a plane.
     toc : ndarray, shape (N,), float64
         Time of impact as a fraction of the step in [0, 1]; (0,) in responses about one snapshot.
     points : ndarray, shape (N, 3), float64
@@ -83,6 +84,10 @@ class ContactArrays:
         Number of parts of the step if meshes move by poses, otherwise 0.
     motion_bounds : ndarray, shape (K,) or (0,), float64
         Upper bound on the deviation of each mesh from its true motion, see ContactArray.msg.
+    n_vertex_plane, n_vertex_vertex, n_vertex_edge : int
+        Number of contacts with planes, of two points, and of points with edges, after those above.
+    thickness : dict of str to float
+        Thickness of the meshes that have one.
     """
 
     mesh_names: tuple[str, ...]
@@ -106,6 +111,10 @@ class ContactArrays:
     features: tuple[str, ...]
     parts: int
     motion_bounds: NDArray[np.float64]
+    n_vertex_plane: int
+    n_vertex_vertex: int
+    n_vertex_edge: int
+    thickness: dict[str, float]
 
     def __len__(self) -> int:
         return len(self.mesh_a)
@@ -160,11 +169,14 @@ def contacts_from_message(message: ContactArray) -> ContactArrays:
         If the arrays of the message are inconsistent; those of the node never are.
     """
     kind = np.frombuffer(message.kind, np.uint8)
-    if (kind > ContactArray.EDGE_FACE).any() or (kind[1:] < kind[:-1]).any():
-        raise ValueError("message: kind must hold those of vertex-face contacts, then edge-edge, then edge-face")
-    count, (n_vertex_face, n_edge_edge, n_edge_face) = len(kind), np.bincount(kind, minlength=3).tolist()
+    if (kind > ContactArray.VERTEX_EDGE).any() or (kind[1:] < kind[:-1]).any():
+        raise ValueError(
+            "message: kind must hold known kinds in ascending order, as those of vertex-face contacts first"
+        )
+    count, numbers = len(kind), np.bincount(kind, minlength=6).tolist()
+    n_vertex_face, n_edge_edge, n_edge_face, n_vertex_plane, n_vertex_vertex, n_vertex_edge = numbers
     of_snapshot = n_edge_face > 0 or len(message.distance) > 0
-    separation = _separation_of(message)
+    separation, thickness = _spacing_of(message)
     order = {name: number for number, name in enumerate(message.mesh_names)}
     optional = {
         name: field(message, name, dtype, (count if len(getattr(message, name)) else 0, *row))
@@ -190,13 +202,17 @@ def contacts_from_message(message: ContactArray) -> ContactArrays:
         features=read_features(message),
         parts=message.parts,
         motion_bounds=field(message, "motion_bounds", np.float64, (len(order) if message.parts else 0,)),
+        n_vertex_plane=n_vertex_plane,
+        n_vertex_vertex=n_vertex_vertex,
+        n_vertex_edge=n_vertex_edge,
+        thickness=dict(thickness),
     )
 
 
-def _separation_of(message: ContactArray) -> Separation:
-    """The separation in force. Raises ValueError where the fields that tell it do not fit together."""
+def _spacing_of(message: ContactArray) -> tuple[Separation, Thickness]:
+    """Separation and thickness in force. Raises ValueError if their fields are inconsistent."""
     try:
-        return result_fields.read_separation(message)
+        return result_fields.read_separation(message), result_fields.read_thickness(message)
     except ValueError as error:
         raise ValueError(f"message: {error}") from None
 
@@ -208,15 +224,16 @@ def scene_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
     ----------
     message : hpccd.msg.ContactArray
     layout : Layout
-        ``Layout.of(mesh_names, topologies)`` of the meshes in the order of ``message.mesh_names``.
+        ``Layout.of(mesh_names, topologies, planes)`` of the meshes in the order of ``message.mesh_names``, and the
+        names of the planes, which are the last of these.
 
     Returns
     -------
     SceneContacts
-        ``vf`` (N, 2), ``vf_toc`` (N,), ``ee`` (M, 4), ``ee_toc`` (M,), ``points``, ``normals``, ``closest``,
-        ``vertices``, ``weights`` and ``approach``. Responses to ``proximity`` have ``vf_distance`` and ``ee_distance``
-        instead of times, those to ``intersections`` only ``ef`` (K, 3). For gradients of the times, in the same rows:
-        ``contacts_from_message(message).toc_gradients()``.
+        ``vf`` (N, 2), ``vf_toc`` (N,), ``ee`` (M, 4), ``ee_toc`` (M,), ``vp``, ``vv``, ``ve`` with their times,
+        ``points``, ``normals``, ``closest``, ``vertices``, ``weights`` and ``approach``. Responses to ``proximity``
+        have ``vf_distance``, ``ee_distance``, ... instead of times, those to ``intersections`` only ``ef`` (K, 3).
+        For gradients of the times, in the same rows: ``contacts_from_message(message).toc_gradients()``.
 
     Raises
     ------

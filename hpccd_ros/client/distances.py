@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hpccd_ros.client.contacts import field, meshes_of
 from hpccd_ros.client.names import belongs, check
+from hpccd_ros.middleware import result_fields
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,15 +26,18 @@ class DistanceArrays:
     mesh_names : tuple of str
         Meshes of the scene.
     distance : ndarray, shape (P,), float64
-        In the unit of the scene; +inf if no pair of features exists.
+        In the unit of the scene, between the thick surfaces: negative where these overlap. +inf if no pair of features
+        exists.
     kind : ndarray, shape (P,), uint8
-        ``DistanceArray.VERTEX_FACE``, ``EDGE_EDGE``, ``EDGE_FACE`` (they intersect) or ``NO_PAIR``.
+        ``DistanceArray.VERTEX_FACE``, ``EDGE_EDGE``, ``EDGE_FACE`` (they intersect), ``VERTEX_PLANE``,
+        ``VERTEX_VERTEX``, ``VERTEX_EDGE`` or ``NO_PAIR``.
     mesh_a, mesh_b : ndarray, shape (P,), uint32
         The mesh of each side: indices into `mesh_names`. The vertex or edge that is near a face is of `mesh_a`.
     features_a : ndarray, shape (P, 2), uint32
         Side a, of `mesh_a`: vertex and ``DistanceArray.NONE``, or both vertices of the edge.
     features_b : ndarray, shape (P, 2), uint32
-        Side b, of `mesh_b`: face and ``DistanceArray.NONE``, or both vertices of the edge.
+        Side b, of `mesh_b`: face and ``DistanceArray.NONE``, both vertices of the edge, a point and ``NONE``, or twice
+        ``NONE`` for a plane.
     points : ndarray, shape (P, 2, 3), float64
         Nearest points of both sides, in the unit of the scene.
     direction : ndarray, shape (P, 3), float64
@@ -46,6 +50,8 @@ class DistanceArrays:
         ``DistanceArray.INSIDE_NONE``, ``INSIDE_A`` (`mesh_a` lies inside `mesh_b`), ``INSIDE_B`` or ``INSIDE_BOTH``.
     nearest : int or None
         Row of the nearest pair of different meshes; None if there is none.
+    thickness : dict of str to float
+        Thickness of the meshes that have one.
     """
 
     mesh_names: tuple[str, ...]
@@ -61,6 +67,7 @@ class DistanceArrays:
     time_to_contact: NDArray[np.float64]
     inside: NDArray[np.uint8]
     nearest: int | None
+    thickness: dict[str, float]
 
     def __len__(self) -> int:
         return len(self.distance)
@@ -124,4 +131,12 @@ def distances_from_message(message: DistanceArray) -> DistanceArrays:
         time_to_contact=field(message, "time_to_contact", np.float64, (count,)) if n_timed else np.full(count, np.nan),
         inside=field(message, "inside", np.uint8, (count,)) if n_timed else np.zeros(count, np.uint8),
         nearest=int(message.nearest) if message.nearest < count else None,
+        thickness=_thickness_of(message),
     )
+
+
+def _thickness_of(message: DistanceArray) -> dict[str, float]:
+    try:
+        return dict(result_fields.read_thickness(message))
+    except ValueError as error:
+        raise ValueError(f"message: {error}") from None

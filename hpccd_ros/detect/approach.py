@@ -85,7 +85,7 @@ def times_to_contact(gaps: Sequence[hc.Gap], speeds: Floats) -> Floats:
     `closing_speeds`."""
     times = np.full(len(gaps), np.nan)
     for row, (gap, speed) in enumerate(zip(gaps, speeds, strict=True)):
-        if gap.kind and (gap.distance == 0 or gap.inside):
+        if gap.kind and (gap.distance <= 0 or gap.inside):
             times[row] = 0.0
         elif gap.kind and not np.isnan(speed):
             times[row] = gap.distance / float(speed) if speed > 0 else np.inf

@@ -10,7 +10,7 @@ import numpy as np
 import hpccd_core as hc
 from hpccd_core.options import FEATURES
 from hpccd_ros.detect.rigid_step import RigidOptions
-from hpccd_ros.detect.separation import NONE, Separation
+from hpccd_ros.detect.separation import NONE, Separation, Thickness, change_thickness
 from hpccd_ros.frames.types import Topology
 
 
@@ -56,8 +56,8 @@ CORE_ERRORS = (ValueError, TypeError, RuntimeError, MemoryError)
 @dataclass(frozen=True)
 class Options:
     """Arguments of hpccd_core.Detector, and settings that may change without a new detector: the separation of pairs of
-    meshes, whether the smallest ``distances`` at the end of a step are computed too, and how steps with meshes that
-    move by poses are cut.
+    meshes and the ``thickness`` of meshes, as (mesh, thickness); whether the smallest ``distances`` at the end of a
+    step are computed too, and how steps with meshes that move by poses are cut.
     """
 
     accuracy: str = "exact"
@@ -69,13 +69,19 @@ class Options:
     distances: bool = False
     features: tuple[str, ...] = FEATURES
     rigid: RigidOptions = RigidOptions()
+    thickness: Thickness = ()
+
+    @property
+    def spacing(self) -> tuple[Separation, Thickness]:
+        """What is set in a detector, and not when it is made."""
+        return self.separation, self.thickness
 
     def same_detector(self, other: "Options") -> bool:
         """Whether a detector made with one may continue with the other."""
         return replace(self, **_CHANGEABLE) == replace(other, **_CHANGEABLE)
 
 
-_CHANGEABLE: dict[str, Any] = {"separation": NONE, "distances": False, "rigid": RigidOptions()}
+_CHANGEABLE: dict[str, Any] = {"separation": NONE, "thickness": (), "distances": False, "rigid": RigidOptions()}
 
 
 def make_detector(scene: hc.Scene, options: Options) -> hc.Detector:
@@ -92,13 +98,14 @@ def make_detector(scene: hc.Scene, options: Options) -> hc.Detector:
     )
     for mesh_a, mesh_b, distance in options.separation.pairs:
         detector.set_separation(mesh_a, mesh_b, distance)
+    change_thickness(detector, (), options.thickness)
     return detector
 
 
 def unusable_options(options: Options) -> str | None:
     """Why the core cannot use these options on this machine, or None."""
     scene = hc.Scene()
-    names = {name for entry in options.separation.pairs for name in entry[:2]}
+    names = {name for entry in options.separation.pairs for name in entry[:2]} | dict(options.thickness).keys()
     for name in sorted(names) or ["probe"]:
         scene.add_mesh(name, np.array([[0, 1, 2]], np.uint32))
     try:

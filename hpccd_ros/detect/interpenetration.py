@@ -2,7 +2,7 @@
 """Where the meshes of a frame intersect, and the translations that separate those that do. No ROS."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,8 +42,10 @@ class InterpenetrationDetector:
     """
 
     def __init__(self, builder: SceneBuilder, *, threads: int = 0, cancellation: Cancellation | None = None) -> None:
-        self._builder = SceneBuilder(builder.meshes, builder.ignored_pairs)
+        meshes = tuple(replace(mesh, ignored_at_rest=None) for mesh in builder.meshes)
         self._numbers = {mesh.name: number for number, mesh in enumerate(builder.meshes)}
+        between_meshes = (pair for pair in builder.ignored_pairs if set(pair) <= self._numbers.keys())
+        self._builder = SceneBuilder(meshes, tuple(between_meshes))  # planes intersect nothing
         self._options = {"outputs": ("points",), "backend": "cpu", "threads": threads}
         self._cancellation = cancellation or Cancellation()
         named = [(self._numbers[a], self._numbers[b]) for a, b in self._builder.pairs]

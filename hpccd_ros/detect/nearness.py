@@ -24,7 +24,7 @@ class Nearness:
 
     def __init__(self, builder: SceneBuilder, options: Options, distance: float) -> None:
         self._detector = StepDetector(builder.between_meshes, _asking(options, distance))
-        self._names = [mesh.name for mesh in builder.meshes]
+        self._names = builder.names
         self._tested = {name for pair in builder.pairs for name in pair}
         self._static = [number for number, mesh in enumerate(builder.meshes) if mesh.static]
         self._closed = ClosedMeshes()
@@ -68,7 +68,7 @@ class Nearness:
 
     def not_closed(self, frame: SceneFrame) -> list[str]:
         """Names of the meshes with faces that are not closed: what lies inside them is unknown."""
-        named = zip(self._names, frame.topologies, strict=True)
+        named = zip(self._names, frame.topologies, strict=False)  # planes have none
         tested = {name: topology for name, topology in named if name in self._tested and len(topology.faces)}
         return [name for name, closed in zip(tested, self._closed.of(tested.values()), strict=True) if not closed]
 

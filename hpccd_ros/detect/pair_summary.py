@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpccd_core.mesh_layout import mesh_of
 from hpccd_ros.detect.approach import SIDES_INSIDE, inside_code
+from hpccd_ros.detect.layout import meshes_of_contacts
 from hpccd_ros.detect.step_detector import Detection
 
 
@@ -45,14 +45,9 @@ def summarise(found: Detection) -> list[PairSummary]:
 
 def _by_pair(found: Detection) -> tuple[np.ndarray, np.ndarray]:
     """(K, K): number of contacts of the meshes i <= j, and their earliest time."""
-    contacts, vertices, faces = found.contacts, found.layout.vertex_offsets, found.layout.face_offsets
     meshes = len(found.layout.mesh_names)
     counts, earliest = np.zeros(meshes * meshes, np.int64), np.full(meshes * meshes, math.inf)
-    for first, second, offsets, toc in (
-        (contacts.vf[:, 0], contacts.vf[:, 1], faces, contacts.vf_toc),
-        (contacts.ee[:, 0], contacts.ee[:, 2], vertices, contacts.ee_toc),
-    ):
-        a, b = mesh_of(first, vertices), mesh_of(second, offsets)
+    for a, b, toc in meshes_of_contacts(found.contacts, found.layout):
         pair = np.minimum(a, b) * meshes + np.maximum(a, b)
         counts += np.bincount(pair, minlength=meshes * meshes)
         np.minimum.at(earliest, pair, toc)

@@ -56,7 +56,7 @@ def motions(
 
 class RigidStep:
     """Computes one step with two detectors. bent: for pairs of meshes of which one moves by poses; straight: for the
-    others, None if there are none. names: of all meshes.
+    others, None if there are none. names: of all meshes and planes.
     """
 
     def __init__(self, names: tuple[str, ...], bent: hc.Detector, straight: hc.Detector | None) -> None:
@@ -76,6 +76,7 @@ class RigidStep:
         self.stats.clear()
         parts = options.parts or cuts.fewest_parts(moving, options.tolerance, options.most_parts).parts
         margins = [cuts.Margin.of(motion, parts) for motion in moving]
+        margins += [cuts.Margin(0.0, 0.0)] * (len(self._names) - len(moving))  # planes
         self.bent.set_separations(cuts.all_grown(asked.table(self._names), margins))
         positions = [self._at_cut(moving, number, parts) for number in range(parts + 1)]
         whole = self._ask(self.straight, positions[0], positions[-1]) if self.straight is not None else None

@@ -2,26 +2,40 @@
 """The core's scene of the meshes with their current topologies. No ROS."""
 
 from collections import defaultdict
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 import hpccd_core as hc
+from hpccd_ros.detect.layout import Layout
 from hpccd_ros.frames.types import MeshSettings, SceneFrame, Topology
 
 
 @dataclass(frozen=True)
+class PlaneSettings:
+    """Settings of a plane (parameters ``plane.NAME.*``): the border of the half-space normal . x >= offset."""
+
+    name: str
+    normal: tuple[float, ...] = (0.0, 0.0, 1.0)
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
 class SceneBuilder:
-    """Makes core scenes of the same meshes with changing topologies; equal builders make equal scenes."""
+    """Makes core scenes of the same meshes with changing topologies; equal builders make equal scenes. Planes come
+    after the meshes and have no topology."""
 
     meshes: tuple[MeshSettings, ...]
     ignored_pairs: tuple[tuple[str, str], ...] = ()
     pair_accuracies: tuple[tuple[str, str, str], ...] = ()
     pair_features: tuple[tuple[str, str, tuple[str, ...]], ...] = ()
+    planes: tuple[PlaneSettings, ...] = ()
 
-    def build(self, topologies: tuple[Topology, ...]) -> hc.Scene:
-        """One topology for each mesh, in order. Raises the core's errors."""
+    def build(self, topologies: tuple[Topology, ...], rest: Sequence[np.ndarray | None] = ()) -> hc.Scene:
+        """One topology for each mesh, in order. rest: the shape at rest of each mesh, if its topology has none. Raises
+        the core's errors, and ValueError for a mesh whose shape at rest is needed and unknown."""
         scene = hc.Scene()
         for mesh, topology in zip(self.meshes, topologies, strict=True):
             scene.add_mesh(
@@ -31,7 +45,23 @@ class SceneBuilder:
                 n_vertices=topology.n_vertices,
                 self_collision=mesh.self_collision,
                 static=mesh.static,
+                **({"points": True} if mesh.points else {}),
             )
+        for plane in self.planes:
+            scene.add_plane(plane.name, plane.normal, plane.offset)
+        for number, (mesh, topology) in enumerate(zip(self.meshes, topologies, strict=True)):
+            if not mesh.self_collision or mesh.static:
+                continue
+            if mesh.ignored_rings:
+                scene.ignore_within(mesh.name, rings=mesh.ignored_rings)
+            if mesh.ignored_at_rest is not None:
+                shape = topology.rest if topology.rest is not None else rest[number] if rest else None
+                if shape is None:
+                    raise ValueError(
+                        f"mesh.{mesh.name}.ignored_at_rest: the shape at rest is unknown here; give "
+                        f"mesh.{mesh.name}.file"
+                    )
+                scene.ignore_within(mesh.name, rest_vertices=shape, distance=mesh.ignored_at_rest)
         for a, b in self.ignored_pairs:
             scene.ignore_pair(a, b)
         for a, b, accuracy in self.pair_accuracies:
@@ -58,7 +88,30 @@ class SceneBuilder:
                 for other in self.meshes[number + 1 :]
                 if other.name not in left_out and not (mesh.static and other.static)
             ]
+            found += [(mesh.name, p.name) for p in self.planes if p.name not in left_out and not mesh.static]
         return tuple(found)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the meshes and planes, in the order of the scene."""
+        return tuple(part.name for part in (*self.meshes, *self.planes))
+
+    @property
+    def plane_names(self) -> tuple[str, ...]:
+        return tuple(plane.name for plane in self.planes)
+
+    def layout(self, topologies: tuple[Topology, ...]) -> Layout:
+        """Of the scene that `build` makes."""
+        return Layout.of(self.names, topologies, self.plane_names)
+
+    @property
+    def rest_of_frames(self) -> tuple[int, ...]:
+        """Numbers of the meshes for which `build` needs a shape at rest, if their topology has none."""
+        return tuple(
+            number
+            for number, mesh in enumerate(self.meshes)
+            if mesh.ignored_at_rest is not None and mesh.self_collision and not mesh.static
+        )
 
     @property
     def rigid(self) -> tuple[bool, ...]:
@@ -83,20 +136,22 @@ class SceneBuilder:
         )
         return replace(self, meshes=meshes, ignored_pairs=self.ignored_pairs + ignored)
 
-    def among(self, names: list[str]) -> "SceneBuilder":
-        """The builder for these meshes, in this order; unknown names are meshes with default settings."""
-        known, wanted = {mesh.name: mesh for mesh in self.meshes}, set(names)
+    def among(self, names: list[str], planes: Collection[str] = ()) -> "SceneBuilder":
+        """The builder for these meshes, in this order, and planes; unknown names are meshes with default settings."""
+        known, wanted = {mesh.name: mesh for mesh in self.meshes}, {*names, *planes}
         return SceneBuilder(
             tuple(known.get(name, MeshSettings(name)) for name in names),
             tuple(pair for pair in self.ignored_pairs if wanted.issuperset(pair)),
             tuple(entry for entry in self.pair_accuracies if wanted.issuperset(entry[:2])),
             tuple(entry for entry in self.pair_features if wanted.issuperset(entry[:2])),
+            tuple(plane for plane in self.planes if plane.name in wanted),
         )
 
     @property
     def between_meshes(self) -> "SceneBuilder":
         """A builder for pairs of different meshes only, with all features."""
-        return SceneBuilder(tuple(replace(mesh, self_collision=False) for mesh in self.meshes), self.ignored_pairs)
+        meshes = tuple(replace(mesh, self_collision=False) for mesh in self.meshes)
+        return SceneBuilder(meshes, self.ignored_pairs, planes=self.planes)
 
     @property
     def pairs(self) -> list[tuple[str, str]]:

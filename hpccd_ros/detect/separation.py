@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Separations of the meshes of a scene, and deviation bounds of their motion. No ROS."""
+"""Separations and thicknesses of the meshes of a scene, and deviation bounds of their motion. No ROS."""
 
 import math
 from collections.abc import Collection
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hpccd_core as hc
-from hpccd_ros.detect.layout import Layout
+from hpccd_ros.detect.layout import Layout, meshes_of_contacts
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,9 @@ def _number(distance: float) -> str:
 #: Features must touch.
 NONE = Separation()
 
+#: (mesh, thickness) of meshes that are not infinitely thin.
+Thickness = tuple[tuple[str, float], ...]
+
 
 @dataclass(frozen=True)
 class MotionBounds:
@@ -78,17 +81,21 @@ def change_separation(detector: hc.Detector, names: tuple[str, ...], old: Separa
         detector.set_separation(names[a], names[b], float(after[a, b]))
 
 
-def count_near(contacts: hc.Contacts, layout: Layout, separation: Separation) -> int:
-    """Number of contacts of meshes with a separation, whether they touch or not."""
-    if not separation.pairs:  # the usual case costs nothing
+def change_thickness(detector: hc.Detector, old: Thickness, new: Thickness) -> None:
+    """From the next call of ``detector`` on, use ``new`` instead of ``old``; its scene is not rebuilt."""
+    before, after = dict(old), dict(new)
+    for name in {**before, **after}:
+        if before.get(name, 0.0) != after.get(name, 0.0):
+            detector.set_thickness(name, after.get(name, 0.0))
+
+
+def count_near(contacts: hc.Contacts, layout: Layout, separation: Separation, thickness: Thickness = ()) -> int:
+    """Number of contacts of meshes with a separation, or a thickness, whether they touch or not."""
+    if not separation.pairs and not thickness:  # the usual case costs nothing
         return len(contacts) if separation.minimum > 0 else 0
     apart = separation.table(layout.mesh_names) > 0
-    of_vertices, of_faces = layout.vertex_offsets, layout.face_offsets
-    near = 0
-    for first, offsets_a, second, offsets_b in (
-        (contacts.vf[:, 0], of_vertices, contacts.vf[:, 1], of_faces),
-        (contacts.ee[:, 0], of_vertices, contacts.ee[:, 2], of_vertices),
-    ):
-        mesh_a, mesh_b = (np.searchsorted(o, i, side="right") - 1 for o, i in ((offsets_a, first), (offsets_b, second)))
-        near += int(np.count_nonzero(apart[mesh_a, mesh_b]))
-    return near
+    for name, value in thickness:
+        number = layout.mesh_names.index(name)
+        if value > 0:
+            apart[number, :] = apart[:, number] = True
+    return sum(int(np.count_nonzero(apart[a, b])) for a, b, _ in meshes_of_contacts(contacts, layout))

@@ -11,9 +11,16 @@ import hpccd_core as hc
 from hpccd_ros.detect import approach
 from hpccd_ros.detect.core import Cancellation, Options, make_detector
 from hpccd_ros.detect.layout import Layout
+from hpccd_ros.detect.rest_shapes import RestShapes
 from hpccd_ros.detect.rigid_step import RigidStep, motions
 from hpccd_ros.detect.scene import SceneBuilder
-from hpccd_ros.detect.separation import NO_BOUNDS, MotionBounds, change_separation, count_near
+from hpccd_ros.detect.separation import (
+    NO_BOUNDS,
+    MotionBounds,
+    change_separation,
+    change_thickness,
+    count_near,
+)
 from hpccd_ros.frames.types import SceneFrame
 
 
@@ -25,7 +32,7 @@ class Detection:
     of each pair of meshes at the end, if the options request it; ``gaps_backend``: the backend that computed them,
     which may differ; ``gaps_before``: those at the start, if they were requested then; ``gaps_approached``: of
     `approach.approached`. ``bounds``: of motions by poses
-    or joints. ``tested_pairs``: of the scene, as in SceneBuilder.
+    or joints. ``tested_pairs``: of the scene, as in SceneBuilder. ``rest_stamps``: as in RestShapes.
     """
 
     start: SceneFrame
@@ -44,26 +51,30 @@ class Detection:
     gaps_approached: np.ndarray | None = None
     bounds: MotionBounds = NO_BOUNDS
     tested_pairs: Sequence[tuple[str, str]] = ()
+    rest_stamps: tuple[int, ...] = ()
 
     @property
     def near(self) -> int:
         """Number of contacts of meshes with a separation."""
-        return count_near(self.contacts, self.layout, self.options.separation)
+        return count_near(self.contacts, self.layout, self.options.separation, self.options.thickness)
 
 
 class StepDetector:
     """Keeps the core's scene and detector from step to step while topologies and ``options`` stay the same.
 
-    ``options`` may be set at any time, from any thread, and apply to the next step.
+    ``options`` may be set at any time, from any thread, and apply to the next step. rest: shapes at rest, if they are
+    shared with other detectors of these meshes.
     """
 
-    def __init__(self, builder: SceneBuilder, options: Options) -> None:
+    def __init__(self, builder: SceneBuilder, options: Options, rest: RestShapes | None = None) -> None:
         self.options = options
+        self.rest = rest or RestShapes(builder.rest_of_frames)
         self._builder = builder
-        self._names = tuple(mesh.name for mesh in builder.meshes)
+        self._names = builder.names
         self._scene: hc.Scene | None = None
         self._scene_of: SceneFrame | None = None
         self._layout: Layout | None = None
+        self._rest_stamps: tuple[int, ...] = ()
         self._detector: hc.Detector | None = None
         self._detector_options: Options | None = None
         self._rigid_step: RigidStep | None = None  # if meshes move by poses; then the detector computes distances only
@@ -72,19 +83,26 @@ class StepDetector:
 
     @property
     def mesh_names(self) -> tuple[str, ...]:
-        """In the order of the scene."""
+        """In the order of the scene, planes last."""
         return self._names
+
+    def layout_of(self, frame: SceneFrame) -> Layout:
+        """Of the scene with the topologies of ``frame``."""
+        return self._builder.layout(frame.topologies)
 
     def cancel(self) -> None:
         """Permanently: the current detection, and all later ones, raise hc.Cancelled. May be called from any thread."""
         self._cancellation.cancel()
 
-    def prepare_scene(self, frame: SceneFrame) -> None:
-        """Make the scene for the topologies of ``frame``. Raises the core's errors."""
-        if self._scene_of is None or not self._scene_of.same_scene(frame):
-            self._scene = self._builder.build(frame.topologies)
-            self._layout = Layout.of(self._names, frame.topologies)
+    def prepare_scene(self, frame: SceneFrame, first: SceneFrame | None = None) -> None:
+        """Make the scene for the topologies of ``frame``. first: the frame at the start of a step to ``frame``, which
+        may give meshes their shape at rest. Raises the core's errors."""
+        new = self.rest.look_at(first or frame)
+        if self._scene_of is None or new or not self._scene_of.same_scene(frame):
+            self._scene = self._builder.build(frame.topologies, self.rest.of(frame.topologies))
+            self._layout = self._builder.layout(frame.topologies)
             self._scene_of, self._detector = frame, None
+            self._rest_stamps = self.rest.stamps(frame.topologies)
 
     def prepare_detector(self) -> None:
         """Make the detector of the scene with the current options. Raises the core's errors."""
@@ -94,11 +112,14 @@ class StepDetector:
             self._rigid_step = self._made_rigid_step(options)
             others = self._rigid_step.detectors if self._rigid_step is not None else ()
             self._detector = self._cancellation.guard(detector, *others)
-        elif options.separation != (before := self._detector_options.separation):
+        elif options.spacing != (before := self._detector_options).spacing:
             detector, self._detector = self._detector, None  # none if only a part of the change is made
-            change_separation(detector, self._names, before, options.separation)
-            if self._rigid_step is not None and self._rigid_step.straight is not None:
-                change_separation(self._rigid_step.straight, self._names, before, options.separation)
+            of_step = self._rigid_step.detectors if self._rigid_step is not None else ()
+            for each in (detector, *of_step):
+                change_thickness(each, before.thickness, options.thickness)
+            # Those of bent motions are set in each step.
+            for each in (detector, *of_step[1:]):
+                change_separation(each, self._names, before.separation, options.separation)
             self._detector = detector
         self._detector_options = options
 
@@ -110,7 +131,7 @@ class StepDetector:
         return RigidStep(
             self._names,
             make_detector(bent.build(topologies), options),
-            make_detector(others.build(topologies), options) if others is not None else None,
+            make_detector(others.build(topologies, self.rest.of(topologies)), options) if others is not None else None,
         )
 
     def distances(self, frame: SceneFrame) -> list[hc.Gap]:
@@ -132,7 +153,7 @@ class StepDetector:
 
     def detect(self, start: SceneFrame, end: SceneFrame) -> Detection:
         """The contacts of the motion from ``start`` to ``end``, of the same scene. Raises the core's errors."""
-        self.prepare_scene(end)
+        self.prepare_scene(end, start)
         self.prepare_detector()
         found = self._detect(start, end) if self._rigid_step is None else self._detect_rigid(start, end)
         if not found.options.distances:
@@ -179,4 +200,5 @@ class StepDetector:
             dict(stats),
             bounds=bounds,
             tested_pairs=self._builder.tested_pairs,
+            rest_stamps=self._rest_stamps,
         )

@@ -79,7 +79,7 @@ def mesh_of_file(vertices: np.ndarray, faces: np.ndarray, values: dict[str, Any]
     elif values["input"] in (POSE, TF):
         place(vertices, values["pose"], by_poses=True)  # reject it with the name of the file rather than at each pose
         frame = MeshFrame(0, vertices, version=0)
-    return Topology(0, len(vertices), faces), frame
+    return Topology(0, len(vertices), faces, rest=vertices), frame
 
 
 def place(vertices: np.ndarray, pose: list[float], by_poses: bool = False) -> np.ndarray:

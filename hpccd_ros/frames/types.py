@@ -35,6 +35,9 @@ class MeshSettings:
     pose: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
     input: str = ""
     whole: bool = False  # each message with vertices contains the topology
+    points: bool = False  # vertices in no face and no edge are points
+    ignored_rings: int = 0
+    ignored_at_rest: float | None = None
 
     @property
     def rigid(self) -> bool:
@@ -65,13 +68,14 @@ NO_EDGES.flags.writeable = False
 @dataclass(frozen=True, eq=False)
 class Topology:
     """Triangles of one mesh, ``faces`` (F,3) uint32, and further edges, ``edges`` (E,2) uint32; indices are below
-    ``n_vertices``. ``sent``: when its message was sent."""
+    ``n_vertices``. ``sent``: when its message was sent. ``rest``: (n_vertices,3), the shape at rest, of a mesh file."""
 
     version: int
     n_vertices: int
     faces: NDArray[np.uint32]
     edges: NDArray[np.uint32] = field(default_factory=lambda: NO_EDGES)
     sent: int = UNKNOWN_TIME
+    rest: NDArray[np.float64] | None = None
 
     def same_content(self, other: "Topology") -> bool:
         """Whether both are equal except for the version."""
@@ -79,6 +83,7 @@ class Topology:
             self.n_vertices == other.n_vertices
             and np.array_equal(self.faces, other.faces)
             and np.array_equal(self.edges, other.edges)
+            and (self.rest is other.rest or (self.rest is not None and np.array_equal(self.rest, other.rest)))
         )
 
 

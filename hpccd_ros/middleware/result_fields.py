@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Converts how a result was computed to fields of ContactArray, and back: separation, features, deviation bounds,
-inputs."""
+"""Converts how a result was computed to fields of ContactArray, and back: separation, thickness, features, deviation
+bounds, shapes at rest, inputs."""
 
 from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from hpccd.msg import ContactArray
+from hpccd.msg import ContactArray, DistanceArray
 
 from hpccd_core.options import FEATURES, REPORTS
 from hpccd_ros.base.quoting import counted
-from hpccd_ros.detect.separation import MotionBounds, Separation
+from hpccd_ros.detect.separation import MotionBounds, Separation, Thickness
 from hpccd_ros.frames.taken_inputs import TakenInput
 
 
@@ -40,6 +40,39 @@ def read_separation(message: ContactArray) -> Separation:
     if why := separation.unusable():
         raise ValueError(f"separation: {why}")
     return separation
+
+
+def fill_thickness(message: ContactArray | DistanceArray, thickness: Thickness) -> None:
+    """Write it into ``message``, which has its ``mesh_names``."""
+    of_meshes = dict(thickness)
+    if any(of_meshes.values()):
+        message.thickness = array("d", (of_meshes.get(name, 0.0) for name in message.mesh_names))
+
+
+def read_thickness(message: ContactArray | DistanceArray) -> Thickness:
+    """Those that are not 0. Raises ValueError if the field is inconsistent or invalid."""
+    values = np.frombuffer(message.thickness, np.float64)
+    _check_of_meshes(message, "thickness", len(values))
+    if not (np.isfinite(values).all() and (values >= 0).all()):
+        raise ValueError("thickness: must be finite and not negative")
+    return tuple((name, t) for name, t in zip(message.mesh_names, values.tolist(), strict=False) if t)
+
+
+def fill_rest(message: ContactArray, stamps: tuple[int, ...]) -> None:
+    """stamps: of RestShapes, for the meshes, which precede the planes in the message's ``mesh_names``."""
+    if stamps:
+        message.rest_stamps = array("q", stamps + (-1,) * (len(message.mesh_names) - len(stamps)))
+
+
+def read_rest(message: ContactArray) -> tuple[int, ...]:
+    """One for each mesh name, or none. Raises ValueError if the field is inconsistent."""
+    _check_of_meshes(message, "rest_stamps", len(message.rest_stamps))
+    return tuple(message.rest_stamps)
+
+
+def _check_of_meshes(message: ContactArray | DistanceArray, name: str, count: int) -> None:
+    if count not in (0, meshes := len(message.mesh_names)):
+        raise ValueError(f"{name}: {counted(count, 'entry', 'entries')} for {counted(meshes, 'mesh', 'meshes')}")
 
 
 # By the kind of contact.

@@ -11,6 +11,7 @@ import hpccd_core as hc
 from hpccd_ros.detect import approach
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.middleware.contact_messages import (
+    TIMED,
     FeaturePairs,
     fill_names,
     fill_outputs,
@@ -24,6 +25,9 @@ KINDS = {
     "vertex-face": DistanceArray.VERTEX_FACE,
     "edge-edge": DistanceArray.EDGE_EDGE,
     "edge-face": DistanceArray.EDGE_FACE,
+    "vertex-plane": DistanceArray.VERTEX_PLANE,
+    "vertex-vertex": DistanceArray.VERTEX_VERTEX,
+    "vertex-edge": DistanceArray.VERTEX_EDGE,
 }
 
 
@@ -32,7 +36,8 @@ def fill_proximity(
 ) -> None:
     """Write all but header, start, step, accuracy and backend. max_contacts: 0: all; else this many of the nearest, in
     canonical order. outputs: which outputs to send, where the core has computed them."""
-    pairs, distance = FeaturePairs.of(near.vf, near.ee), np.concatenate([near.vf_distance, near.ee_distance])
+    pairs = FeaturePairs.of_result(near)
+    distance = np.concatenate([getattr(near, f"{kind}_distance") for kind in TIMED])
     keep = lowest(distance, max_contacts) if 0 < max_contacts < len(pairs) else None
     _fill(message, pairs, layout, near.hash, keep)
     message.distance = to_field(distance if keep is None else distance[keep])
@@ -78,6 +83,8 @@ def fill_distances(
         for side, (indices, offsets) in enumerate(_sides(gap, layout)):
             meshes[row, side] = mesh = int(np.searchsorted(offsets, indices[0], side="right")) - 1
             features[row, side, : len(indices)] = [index - offsets[mesh] for index in indices]
+        if gap.kind == "vertex-plane":
+            meshes[row, 1] = layout.planes[gap.features[1]]
         sides = approach.SIDES_INSIDE[gap.inside]
         swapped = layout.mesh_names[meshes[row, 0]] != gap.mesh_a
         inside[row] = approach.inside_code(sides[::-1] if swapped else sides)
@@ -96,7 +103,9 @@ def fill_distances(
 
 
 def _sides(gap: hc.Gap, layout: Layout):
-    """((indices, offsets of their numbering) of the first side, that of the second)."""
-    width = 1 if gap.kind == "vertex-face" else 2
-    of_second = layout.vertex_offsets if gap.kind == "edge-edge" else layout.face_offsets
-    return (gap.features[:width], layout.vertex_offsets), (gap.features[width:], of_second)
+    """(indices, offsets of their numbering) of the first side and the second; a plane has none."""
+    width = 2 if gap.kind in ("edge-edge", "edge-face") else 1
+    yield gap.features[:width], layout.vertex_offsets
+    if gap.kind != "vertex-plane":
+        of_faces = gap.kind in ("vertex-face", "edge-face")
+        yield gap.features[width:], layout.face_offsets if of_faces else layout.vertex_offsets

@@ -44,6 +44,8 @@ class ContactsPublisher:
             outputs=tuple(self._settings["outputs"]),
         )
         result_fields.fill_separation(message, found.options.separation)
+        result_fields.fill_thickness(message, found.options.thickness)
+        result_fields.fill_rest(message, found.rest_stamps)
         result_fields.fill_features(message, found.options.features)
         result_fields.fill_bounds(message, found.bounds)
         message.dropped_frames = dropped_frames
@@ -69,6 +71,7 @@ class ContactsPublisher:
             approached=found.gaps_approached,
             seconds=1e-9 * (found.end.stamp - found.start.stamp),
         )
+        result_fields.fill_thickness(message, found.options.thickness)
         self._distances.publish(message)
 
     def _publish_pairs(self, found: Detection, header: Header) -> None:

@@ -127,6 +127,7 @@ def _contacts(asked: Asked, query: Query) -> QueryResult:
         message, found, asked.layout, max_contacts=asked.max_contacts, outputs=asked.options.outputs
     )
     result_fields.fill_separation(message, asked.options.separation)
+    result_fields.fill_thickness(message, asked.options.thickness)
     result_fields.fill_features(message, asked.options.features)
     return QueryResult(counted(message.total, "contact"), contacts=message)
 
@@ -143,6 +144,7 @@ def _proximity(asked: Asked, query: Query) -> QueryResult:
     snapshot_messages.fill_proximity(
         message, near, asked.layout, max_contacts=asked.max_contacts, outputs=asked.options.outputs
     )
+    result_fields.fill_thickness(message, asked.options.thickness)
     result_fields.fill_features(message, asked.options.features)
     return QueryResult(f"{counted(message.total, 'pair')} within {query.distance:g}", contacts=message)
 
@@ -160,6 +162,7 @@ def _distances(asked: Asked, query: Query) -> QueryResult:
     gaps = asked.detector.distances(asked.end)
     asked.enter(WRITING)
     snapshot_messages.fill_distances(message, gaps, asked.layout)
+    result_fields.fill_thickness(message, asked.options.thickness)
     return QueryResult(f"{counted(len(gaps), 'pair')} of meshes", distances=message)
 
 

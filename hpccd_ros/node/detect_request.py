@@ -12,7 +12,6 @@ from hpccd_core.options import ACCURACIES, REPORTS
 from hpccd_ros.base.quoting import counted, listed, quoted, repeated, shortened
 from hpccd_ros.detect.core import Cancellation, Options, make_detector
 from hpccd_ros.detect.kept_detectors import DetectorOf, KeptDetectors
-from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.types import Topology
 from hpccd_ros.middleware import fields, mesh_messages
@@ -51,7 +50,7 @@ def compute(
     """
     enter(READING)
     query = requested_query(request)
-    names = _names(request, scene, limits["max_meshes"])
+    names, planes = _names(request, scene, limits["max_meshes"])
     for field in ("topologies", "end") if query.of_snapshot else ("topologies", "start", "end"):
         given = len(getattr(request, field))
         if given != len(names) and not (field == "topologies" and given == 0):
@@ -68,16 +67,17 @@ def compute(
         options,
         accuracy=_choice("accuracy", request.accuracy or options.accuracy, ACCURACIES),
         report=_choice("report", request.report or "all", REPORTS),
-        separation=query.separation or options.separation.among(names),
+        separation=query.separation or options.separation.among([*names, *planes]),
+        thickness=tuple(entry for entry in options.thickness if entry[0] in names),
         features=query.features or options.features,
     )
     enter(BUILDING)
-    builder = scene.builder.among(names)
+    builder = scene.builder.among(names, planes)
     used = kept.take(builder, topologies, options) or DetectorOf(
         builder, topologies, options, make_detector(builder.build(topologies), options)
     )
     detector = cancellation.guard(used.detector)
-    layout = Layout.of(tuple(names), topologies)
+    layout = builder.layout(topologies)
     asked = Asked(start, end, detector, layout, options, limits["max_contacts"], enter)
     enter(DETECTING)
     result = QUERIES[query.name](asked, query)
@@ -100,8 +100,10 @@ def _choice(field: str, value: str, choices: tuple[str, ...]) -> str:
     return value
 
 
-def _names(request: Request, scene: NodeScene, most: int) -> list[str]:
-    names = list(request.mesh_names) or list(scene.topologies)
+def _names(request: Request, scene: NodeScene, most: int) -> tuple[list[str], list[str]]:
+    """Of the meshes and of the planes; by default all of the node."""
+    planes = [name for name in scene.builder.plane_names if not request.mesh_names or name in request.mesh_names]
+    names = [name for name in request.mesh_names or scene.topologies if name not in planes]
     if not names:
         raise RequestError("mesh_names: empty, and the node has no meshes of its own")
     if len(names) > most:
@@ -110,7 +112,7 @@ def _names(request: Request, scene: NodeScene, most: int) -> list[str]:
         )
     if len(set(names)) != len(names):
         raise RequestError(f"mesh_names: names must differ, {repeated(names)} occurs twice")
-    return names
+    return names, planes
 
 
 def _topology(request: Request, scene: NodeScene, limits: dict[str, Any], index: int, name: str) -> Topology:

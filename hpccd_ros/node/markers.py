@@ -12,6 +12,9 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from hpccd_ros.detect.interpenetration import Depth
+from hpccd_ros.detect.plane_patch import FACES as PATCH_FACES
+from hpccd_ros.detect.plane_patch import patch
+from hpccd_ros.detect.scene import PlaneSettings
 from hpccd_ros.middleware import fields
 
 # Colour-blind safe pair (Okabe and Ito): vertex-face orange, edge-edge blue.
@@ -22,6 +25,8 @@ _NEAR = ColorRGBA(r=0.34, g=0.71, b=0.91, a=1.0)
 # Vermillion, and reddish purple.
 _INTERSECTION = ColorRGBA(r=0.84, g=0.37, b=0.0, a=1.0)
 _DEPTH = ColorRGBA(r=0.80, g=0.47, b=0.65, a=1.0)
+# Grey, translucent: planes are beneath everything.
+_PLANE = ColorRGBA(r=0.6, g=0.6, b=0.6, a=0.4)
 _NORMAL_LENGTH = 10.0  # in point diameters
 
 
@@ -36,8 +41,8 @@ def contact_markers(
     size: float,
     limit: int,
 ) -> MarkerArray:
-    """Always four markers, so that old ones disappear: vertex-face, edge-edge (points), normals, and connections of
-    near pairs (lines).
+    """Always four markers, so that old ones disappear: vertex-face, edge-edge and other kinds (points), normals, and
+    connections of near pairs (lines).
 
     points, normals: (N,3), the first ``n_vertex_face`` of vertex-face contacts. closest: (N,2,3) nearest points of both
     sides, or (0,2,3) where nothing is to stay apart. limit: most contacts drawn, taken evenly from the whole list.
@@ -80,6 +85,20 @@ def depth_markers(depths: Sequence[Depth], *, stamp: Time, frame_id: str, size: 
         # Diameters of shaft and head; the head is not longer than half of a short arrow.
         marker.scale.y = size
         marker.scale.z = min(1.5 * size, 0.5 * depths[number].length) if len(ends) else 0.0
+        markers.append(marker)
+    return markers
+
+
+def plane_markers(
+    planes: Sequence[PlaneSettings], vertices: Sequence[np.ndarray], *, stamp: Time, frame_id: str
+) -> list[Marker]:
+    """A patch of each plane beneath the meshes; a marker without points deletes that of a plane far away."""
+    markers = []
+    for number, plane in enumerate(planes):
+        corners = patch(plane, vertices)
+        points = np.empty((0, 3)) if corners is None else corners[PATCH_FACES.reshape(-1)]
+        marker = _marker(number, "planes", Marker.TRIANGLE_LIST, stamp, frame_id, 1.0, _PLANE, points)
+        marker.scale.z = 1.0  # coordinates are multiplied by it
         markers.append(marker)
     return markers
 

@@ -19,7 +19,13 @@ from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.step_detector import Detection
 from hpccd_ros.middleware import qos, topic_names
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
-from hpccd_ros.node.markers import contact_markers, depth_markers, intersection_marker, surface_cloud
+from hpccd_ros.node.markers import (
+    contact_markers,
+    depth_markers,
+    intersection_marker,
+    plane_markers,
+    surface_cloud,
+)
 
 Shown = tuple[Detection, Header, SceneBuilder]
 
@@ -59,7 +65,7 @@ class ViewerPublisher:
             self._thread = None
 
     def _publish(self, shown: Shown, search: InterpenetrationDetector) -> None:
-        found, header, _ = shown
+        found, header, builder = shown
         if self._surface.get_subscription_count():
             self._surface.publish(surface_cloud(found.end.vertices, header))
         if not self._markers.get_subscription_count():
@@ -75,6 +81,7 @@ class ViewerPublisher:
             limit=limit,
             **of_all,
         )
+        message.markers += plane_markers(builder.planes, found.end.vertices, **of_all)
         lines, depths = [], []
         if settings["markers_intersections"] or settings["markers_depth"]:
             scene = found.end.topologies, found.end.vertices

@@ -5,7 +5,17 @@
 """
 
 from hpccd_ros.middleware.qos_overrides import DEEPEST
-from hpccd_ros.params.table import ALWAYS, MESH_ROWS, NEVER, NODE_GROUPS, PAIR_ROWS, ROBOT_ROWS, UNCONFIGURED, Row
+from hpccd_ros.params.table import (
+    ALWAYS,
+    MESH_ROWS,
+    NEVER,
+    NODE_GROUPS,
+    PAIR_ROWS,
+    PLANE_ROWS,
+    ROBOT_ROWS,
+    UNCONFIGURED,
+    Row,
+)
 from hpccd_ros.params.values import allowed
 
 _HEAD = """\
@@ -23,9 +33,9 @@ hpccd_node --ros-args --params-file my.yaml
 
 `-p accuracy:=balanced` on the command line sets one parameter. [Profiles](node.md#profiles) are parameter files for
 common purposes. The node does not start (exit status 2) with an invalid value, or with an unknown name that resembles
-one of these or begins with `mesh.`, `robot.`, `pairs.` or `stop`; it prints the reason and the nearest name. Any other
-unknown name is taken for a parameter of another node: it has no effect, and the log has a warning. In a file for
-several nodes, write the parameters of each under the name of the node, not under `/**`.
+one of these or begins with `mesh.`, `robot.`, `plane.`, `pairs.` or `stop`; it prints the reason and the nearest name.
+Any other unknown name is taken for a parameter of another node: it has no effect, and the log has a warning. In a file
+for several nodes, write the parameters of each under the name of the node, not under `/**`.
 
 **When a parameter can change:**
 
@@ -62,6 +72,7 @@ def page() -> str:
     groups = [(heading, "", rows) for heading, rows in NODE_GROUPS.items()]
     groups.append(("Meshes: each NAME in `meshes`", "mesh.NAME.", MESH_ROWS))
     groups.append(("Robots: each NAME in `robots`", "robot.NAME.", ROBOT_ROWS))
+    groups.append(("Planes: each NAME in `planes`", "plane.NAME.", PLANE_ROWS))
     groups.append(("Pairs of meshes: each with a NAME of your choice", "pairs.NAME.", PAIR_ROWS))
     return "\n".join([_HEAD, *(_group(*group) for group in groups), _QUALITY_OF_SERVICE.format(deepest=DEEPEST)])
 

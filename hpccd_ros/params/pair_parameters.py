@@ -41,6 +41,7 @@ def check(settings: dict[str, Any], links: Links = NO_LINKS) -> None:
     pair_accuracies(settings, links)
     pair_features(settings, links)
     separation(settings, links)
+    thickness(settings, links)
 
 
 def ignored_pairs(
@@ -87,6 +88,7 @@ def pair_accuracies(settings: dict[str, Any], links: Links = NO_LINKS) -> tuple[
             )
         given.append(_PairSetting("pair_accuracy", text, tuple(names), tier))
     agreed = _agreed([*given, *_structured(settings, "accuracy")])
+    _reject_planes(agreed, settings, "the tier: planes are always exact")
     return tuple((*one.names, one.value) for one in _spread(agreed, settings, links))
 
 
@@ -106,9 +108,10 @@ def pair_features(settings: dict[str, Any], links: Links = NO_LINKS) -> tuple[tu
         kinds.add(kind)
     given = [_PairSetting("pair_features", ", ".join(texts), *rest) for texts, *rest in listed_kinds.values()]
     given += [_PairSetting(o.parameter, o.text, o.names, set(o.value)) for o in _structured(settings, "features")]
+    agreed = _agreed(given)
+    _reject_planes(agreed, settings, "the features: vertices are tested against planes whatever the features are")
     return tuple(
-        (*one.names, tuple(name for name in FEATURES if name in one.value))
-        for one in _spread(_agreed(given), settings, links)
+        (*one.names, tuple(name for name in FEATURES if name in one.value)) for one in _spread(agreed, settings, links)
     )
 
 
@@ -127,6 +130,38 @@ def separation(settings: dict[str, Any], links: Links = NO_LINKS) -> Separation:
     agreed = _agreed([*given, *_structured(settings, "separation")])
     spread = _spread(agreed, settings, links)
     return Separation(settings["minimum_separation"], tuple((*one.names, one.value) for one in spread))
+
+
+def _reject_planes(agreed: Iterable[_PairSetting], settings: dict[str, Any], what: str) -> None:
+    for one in agreed:
+        if plane := next((name for name in one.names if name in settings["planes"]), None):
+            raise ParameterError(f"{one.parameter}: {quoted(one.text)}: {quoted(plane)} is a plane; leave out {what}")
+
+
+def thickness(settings: dict[str, Any], links: Links = NO_LINKS) -> tuple[tuple[str, float], ...]:
+    """Parameter ``thickness`` as (mesh name, thickness); a link's own has priority over that of its robot. Raises
+    ParameterError."""
+    given: dict[str, tuple[str, float]] = {}
+    for text in settings["thickness"]:
+        name, _, number = text.rpartition(":")
+        value = _distance(number)
+        if not _is_name(settings, name) or name in settings["planes"] or value is None:
+            meant = _meant(settings, [name], text)
+            if name in settings["planes"]:
+                meant = f"; {quoted(name)} is a plane, which has none: shift its offset, or use pair_separation"
+            raise ParameterError(
+                f"thickness: {quoted(text)} must be NAME:THICKNESS with a mesh out of {_names(settings)} and a number "
+                f"from 0 to {FARTHEST:g} in the unit of the vertices{meant}"
+            )
+        first = given.setdefault(name, (text, value))
+        if first[1] != value:
+            raise ParameterError(f"thickness: {quoted(text)} contradicts {quoted(first[0])}; leave one out")
+    found: dict[str, float] = {}
+    for name in sorted(given, key=lambda name: name not in settings["robots"]):
+        text, value = given[name]
+        one = _PairSetting("thickness", text, (name, name), value)
+        found.update(dict.fromkeys(_meshes(name, one, settings, links), value))
+    return tuple(found.items())
 
 
 def _distance(text: str) -> float | None:
@@ -197,7 +232,7 @@ def _spread(agreed: Sequence[_PairSetting], settings: dict[str, Any], links: Lin
 
 
 def _meshes(name: str, given: _PairSetting, settings: dict[str, Any], links: Links) -> Sequence[str]:
-    if name in settings["meshes"]:
+    if name in settings["meshes"] or name in settings["planes"]:
         return (name,)
     robot = name.partition("/")[0]
     if robot not in links:
@@ -218,7 +253,11 @@ def _are_names(settings: dict[str, Any], names: Sequence[str]) -> bool:
 
 
 def _is_name(settings: dict[str, Any], name: str) -> bool:
-    return name in settings["meshes"] or (name.partition("/")[0] in settings["robots"] and not name.endswith("/"))
+    return (
+        name in settings["meshes"]
+        or name in settings["planes"]
+        or (name.partition("/")[0] in settings["robots"] and not name.endswith("/"))
+    )
 
 
 def _meant(settings: dict[str, Any], names: Sequence[str], text: str = "") -> str:
@@ -226,9 +265,12 @@ def _meant(settings: dict[str, Any], names: Sequence[str], text: str = "") -> st
     if ":" not in text and (colons := _NO_COLONS.sub(":", text)) != text:
         return f"; did you mean {shortened(colons)}?"
     unknown = next((name for name in names if not _is_name(settings, name)), None)
-    return "" if unknown is None else suggestion(unknown, [*settings["meshes"], *settings["robots"]])
+    return (
+        "" if unknown is None else suggestion(unknown, [*settings["meshes"], *settings["robots"], *settings["planes"]])
+    )
 
 
 def _names(settings: dict[str, Any]) -> str:
     known = [*settings["meshes"], *settings["robots"], *(f"{robot}/LINK" for robot in settings["robots"])]
+    known += settings["planes"]
     return listed(known) or "(none)"

@@ -17,7 +17,7 @@ from rclpy.parameter import Parameter
 
 from hpccd_ros.base import quoting
 from hpccd_ros.params.parameter_file import parameter_value, without_section
-from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS, PAIRS, ROBOT, UNCONFIGURED, Row
+from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS, PAIRS, PLANE, ROBOT, UNCONFIGURED, Row
 from hpccd_ros.params.values import (
     ParameterError,
     allowed,
@@ -26,6 +26,7 @@ from hpccd_ros.params.values import (
     normalise,
     pair_names,
     pair_rows,
+    plane_rows,
     robot_rows,
     unusable_value,
     usable,
@@ -64,8 +65,8 @@ def descriptor(row: Row) -> ParameterDescriptor:
 def declare(node: Node) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     """Declare all parameters of the table; return (node settings, mesh name -> mesh settings) as `values.checked` does.
 
-    Raises ParameterError: wrong type, out of range, bad or repeated name of a mesh or robot, unknown parameter of a
-    pair.
+    Raises ParameterError: wrong type, out of range, bad or repeated name of a mesh, robot or plane, unknown parameter
+    of a pair.
     """
     settings = {row.name: _declare_one(node, row, row.name) for row in NODE_ROWS}
     names = settings["meshes"]
@@ -73,6 +74,10 @@ def declare(node: Node) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     settings[ROBOT] = {
         robot: {row.name: _declare_one(node, row, name) for row, name in robot_rows(robot)}
         for robot in settings["robots"]
+    }
+    settings[PLANE] = {
+        plane: {row.name: _declare_one(node, row, name) for row, name in plane_rows(plane)}
+        for plane in settings["planes"]
     }
     settings[PAIRS] = {
         pair: {row.name: _declare_one(node, row, name) for row, name in pair_rows(pair)}
@@ -159,7 +164,7 @@ def watch(
     rows = {row.name: (lambda wanted, _: wanted, row) for row in NODE_ROWS}
     for mesh in meshes:
         rows |= {f"mesh.{mesh}.{row.name}": (lambda _, of, mesh=mesh: of[mesh], row) for row in MESH_ROWS}
-    for part, named_rows in ((PAIRS, pair_rows), (ROBOT, robot_rows)):
+    for part, named_rows in ((PAIRS, pair_rows), (ROBOT, robot_rows), (PLANE, plane_rows)):
         for each in settings[part]:
             rows |= {
                 name: (lambda wanted, _, part=part, each=each: wanted[part][each], row)

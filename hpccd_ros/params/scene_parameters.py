@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parameters of the scene: meshes, what is computed, placement of positions."""
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -9,7 +10,7 @@ from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.base.quoting import quoted, shortened
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.rigid_step import RigidOptions
-from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.detect.scene import PlaneSettings, SceneBuilder
 from hpccd_ros.detect.separation import NONE
 from hpccd_ros.frames.follower import Follower
 from hpccd_ros.frames.pipeline import FramePipeline
@@ -17,7 +18,7 @@ from hpccd_ros.frames.types import POSE, TF, AssemblyRules, MeshFrame, MeshSetti
 from hpccd_ros.middleware.topic_names import WHOLE
 from hpccd_ros.params import pair_parameters, robot_parameters
 from hpccd_ros.params.robot_parameters import NO_ROBOTS, Robots
-from hpccd_ros.params.table import ROBOT
+from hpccd_ros.params.table import FARTHEST, PLANE, ROBOT
 from hpccd_ros.params.values import ParameterError
 
 MeshValues = dict[str, dict[str, Any]]
@@ -32,7 +33,21 @@ def scene_builder(settings: dict[str, Any], meshes: MeshValues, robots: Robots =
         pair_parameters.ignored_pairs(settings, links, by_default),
         pair_parameters.pair_accuracies(settings, links),
         pair_parameters.pair_features(settings, links),
+        planes(settings),
     )
+
+
+def planes(settings: dict[str, Any]) -> tuple[PlaneSettings, ...]:
+    """In the order of parameter ``planes``. Raises ParameterError."""
+    for name, of in settings[PLANE].items():
+        normal = of["normal"]
+        if len(normal) != 3 or not all(map(math.isfinite, normal)) or not any(normal):
+            raise ParameterError(
+                f"{PLANE}.{name}.normal: {shortened(normal)} must be three finite numbers x y z that are not all 0"
+            )
+        if (largest := max(map(abs, normal))) > FARTHEST:
+            raise ParameterError(f"{PLANE}.{name}.normal: {largest:g} is beyond {FARTHEST:g}; scale it down")
+    return tuple(PlaneSettings(name, tuple(of["normal"]), of["offset"]) for name, of in settings[PLANE].items())
 
 
 def mesh_settings(meshes: MeshValues) -> tuple[MeshSettings, ...]:
@@ -82,7 +97,7 @@ def detector_options(settings: dict[str, Any], robots: Robots = NO_ROBOTS) -> Op
     wanted = pair_parameters.separation(settings, robot_parameters.links(robots))
     if settings["markers"]:
         outputs |= {"points", "normals"}
-        if wanted != NONE:
+        if wanted != NONE or settings["thickness"]:
             outputs.add("closest")
     return Options(
         settings["accuracy"],
@@ -94,6 +109,7 @@ def detector_options(settings: dict[str, Any], robots: Robots = NO_ROBOTS) -> Op
         settings["distances"],
         features(settings),
         rigid(settings),
+        thickness=pair_parameters.thickness(settings, robot_parameters.links(robots)),
     )
 
 
@@ -128,6 +144,7 @@ def check(settings: dict[str, Any], meshes: MeshValues, robots: Robots = NO_ROBO
     pair_parameters.check(settings, robot_parameters.links(robots))
     robot_parameters.check(settings)
     features(settings)
+    planes(settings)
     poses(meshes)
     # The links of an unknown robot are unknown.
     if set(settings["robots"]) <= set(robots):

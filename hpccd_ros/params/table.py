@@ -64,6 +64,15 @@ SCENE_ROWS = (
         example=["cloth"],
     ),
     Row(
+        "planes",
+        "string[]",
+        [],
+        "Names of planes, such as a floor. Each bounds a half-space, costs almost nothing, and has parameters "
+        "plane.NAME.*; in parameters of pairs its name stands for a mesh",
+        change=NEVER,
+        example=["floor"],
+    ),
+    Row(
         "ignored_pairs",
         "string[]",
         [],
@@ -151,6 +160,15 @@ DETECTION_ROWS = (
         "Pairs of meshes with another separation, as NAME:NAME:DISTANCE. The same name twice: within that mesh",
         change=ALWAYS,
         example=["cloth:floor:0.01"],
+    ),
+    Row(
+        "thickness",
+        "string[]",
+        [],
+        "Thickness of meshes, as NAME:THICKNESS; the name of a robot means all its links. The separation of two meshes "
+        "is theirs plus both thicknesses, and distances are between the thick surfaces",
+        change=ALWAYS,
+        example=["cloth:0.002"],
     ),
     Row(
         "distances",
@@ -525,6 +543,27 @@ PAIR_ROWS = (
         example=["edge_edge"],
     ),
     Row("ignored", "bool", None, "Do not test the pair; not set: as in `ignored_pairs`", example=True),
+)
+
+# Prefix of the parameters of planes: plane.NAME.* for each NAME in `planes`.
+PLANE = "plane"
+
+PLANE_ROWS = (
+    Row(
+        "normal",
+        "float[]",
+        [0.0, 0.0, 1.0],
+        "Normal x y z of any length: it points to the side on which meshes must stay",
+    ),
+    Row(
+        "offset",
+        "float",
+        0.0,
+        "normal . x on the plane: meshes must stay where normal . x >= offset",
+        unit="unit of the vertices times the length of the normal",
+        span=(-FARTHEST, FARTHEST),
+        example=0.0,
+    ),
 )
 
 MESH_ROWS = (

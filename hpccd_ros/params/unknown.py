@@ -9,12 +9,26 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from hpccd_ros.base.quoting import counted, listed, nearest, shortened, suggestion
-from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS, PAIRS, ROBOT, ROBOT_ROWS, STOP_ROWS, Row
+from hpccd_ros.params.table import (
+    MESH_ROWS,
+    NODE_ROWS,
+    PAIRS,
+    PLANE,
+    PLANE_ROWS,
+    ROBOT,
+    ROBOT_ROWS,
+    STOP_ROWS,
+    Row,
+)
 from hpccd_ros.params.values import ParameterError
 
 MESH = "mesh"
 # First part of a name -> the parameter with the names of its sections, and the rows of each.
-_SECTIONS: dict[str, tuple[str, Sequence[Row]]] = {MESH: ("meshes", MESH_ROWS), ROBOT: ("robots", ROBOT_ROWS)}
+_SECTIONS: dict[str, tuple[str, Sequence[Row]]] = {
+    MESH: ("meshes", MESH_ROWS),
+    ROBOT: ("robots", ROBOT_ROWS),
+    PLANE: ("planes", PLANE_ROWS),
+}
 _QOS = "qos_overrides"  # of a topic that the node does not have: without effect
 _FIRST_PARTS = (*_SECTIONS, PAIRS, _QOS)
 _NAMES = [row.name for row in NODE_ROWS]

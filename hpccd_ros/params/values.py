@@ -6,7 +6,17 @@ from typing import Any
 
 from hpccd_ros.base import quoting
 from hpccd_ros.middleware import topic_names
-from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS, PAIR_ROWS, PAIRS, ROBOT, ROBOT_ROWS, Row
+from hpccd_ros.params.table import (
+    MESH_ROWS,
+    NODE_ROWS,
+    PAIR_ROWS,
+    PAIRS,
+    PLANE,
+    PLANE_ROWS,
+    ROBOT,
+    ROBOT_ROWS,
+    Row,
+)
 
 
 class ParameterError(ValueError):
@@ -63,7 +73,7 @@ def example(row: Row) -> str:
 def row_of(name: str) -> Row | None:
     """The row of the parameter with this full name."""
     section, _, _ = name.partition(".")
-    rows = {"mesh": MESH_ROWS, ROBOT: ROBOT_ROWS, PAIRS: PAIR_ROWS}.get(section, NODE_ROWS)
+    rows = {"mesh": MESH_ROWS, ROBOT: ROBOT_ROWS, PLANE: PLANE_ROWS, PAIRS: PAIR_ROWS}.get(section, NODE_ROWS)
     key = name if rows is NODE_ROWS else name.rpartition(".")[2]
     return next((row for row in rows if row.name == key), None)
 
@@ -82,15 +92,19 @@ def allowed(row: Row) -> str:
 def checked(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     """(node settings, mesh name -> mesh settings) of the parameters ``given`` by full name, as a file has them.
 
-    settings["pairs"]: name of a pair -> its settings; settings["robot"]: name of a robot -> its settings. None: not
-    set. Raises ParameterError: wrong type, out of range, bad or repeated name of a mesh or robot, unknown parameter of
-    a pair.
+    settings["pairs"]: name of a pair -> its settings; settings["robot"], settings["plane"]: name of a robot or plane ->
+    its settings. None: not set. Raises ParameterError: wrong type, out of range, bad or repeated name of a mesh, robot
+    or plane, unknown parameter of a pair.
     """
     settings = {row.name: _checked_value(row, row.name, given.get(row.name)) for row in NODE_ROWS}
     check_names(settings)
     settings[ROBOT] = {
         robot: {row.name: _checked_value(row, name, given.get(name)) for row, name in robot_rows(robot)}
         for robot in settings["robots"]
+    }
+    settings[PLANE] = {
+        plane: {row.name: _checked_value(row, name, given.get(name)) for row, name in plane_rows(plane)}
+        for plane in settings["planes"]
     }
     settings[PAIRS] = {
         pair: {row.name: _checked_value(row, name, given.get(name)) for row, name in pair_rows(pair)}
@@ -121,8 +135,8 @@ def _checked_value(row: Row, name: str, value: Any) -> Any:
 
 
 def check_names(settings: dict[str, Any]) -> None:
-    """Names of meshes and robots. Raises ParameterError for one that is invalid in a topic, or is repeated."""
-    for parameter in ("meshes", "robots"):
+    """Names of meshes, robots and planes. Raises ParameterError for one that is invalid in a topic, or is repeated."""
+    for parameter in ("meshes", "robots", "planes"):
         names = settings[parameter]
         for name in names:
             if not topic_names.MESH_NAME.fullmatch(name):
@@ -134,8 +148,12 @@ def check_names(settings: dict[str, Any]) -> None:
             raise ParameterError(
                 f"{parameter}: names must differ, {quoting.repeated(names)} is listed twice; use each name once"
             )
-    if both := sorted(set(settings["meshes"]) & set(settings["robots"])):
-        raise ParameterError(f"robots: {quoting.listed(both)} is also in the parameter meshes; choose another name")
+    for parameter, others in (("robots", ("meshes",)), ("planes", ("meshes", "robots"))):
+        for other in others:
+            if both := sorted(set(settings[other]) & set(settings[parameter])):
+                raise ParameterError(
+                    f"{parameter}: {quoting.listed(both)} is also in the parameter {other}; choose another name"
+                )
 
 
 def pair_names(given: Iterable[str]) -> list[str]:
@@ -166,6 +184,11 @@ def robot_rows(robot: str) -> list[tuple[Row, str]]:
     return [(row, f"{ROBOT}.{robot}.{row.name}") for row in ROBOT_ROWS]
 
 
+def plane_rows(plane: str) -> list[tuple[Row, str]]:
+    """The parameters of a plane, with their full names."""
+    return [(row, f"{PLANE}.{plane}.{row.name}") for row in PLANE_ROWS]
+
+
 def undeclared(name: str, known: Iterable[str]) -> str:
     """Why a parameter that a running node does not have cannot be set. known: those that it has."""
     try:
@@ -186,10 +209,13 @@ def undeclared(name: str, known: Iterable[str]) -> str:
 _ROS_OWN = ("use_sim_time", "start_type_description_service")
 
 
-def unknown(given: Iterable[str], meshes: Iterable[str], robots: Iterable[str] = ()) -> list[str]:
-    """Those of the names ``given`` that a node of these meshes and robots would not have."""
+def unknown(
+    given: Iterable[str], meshes: Iterable[str], robots: Iterable[str] = (), planes: Iterable[str] = ()
+) -> list[str]:
+    """Those of the names ``given`` that a node of these meshes, robots and planes would not have."""
     rows = {row.name for row in NODE_ROWS} | {f"mesh.{mesh}.{row.name}" for mesh in meshes for row in MESH_ROWS}
     of_pairs = {name for pair in pair_names(given) for _, name in pair_rows(pair)}
     of_robots = {name for robot in robots for _, name in robot_rows(robot)}
-    known = rows | of_pairs | of_robots | set(_ROS_OWN)
+    of_planes = {name for plane in planes for _, name in plane_rows(plane)}
+    known = rows | of_pairs | of_robots | of_planes | set(_ROS_OWN)
     return sorted(n for n in given if n not in known and not n.startswith("qos_overrides."))

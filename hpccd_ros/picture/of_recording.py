@@ -9,7 +9,11 @@ import numpy as np
 import hpccd_core as hc
 from hpccd_core.options import FEATURES
 from hpccd_ros.detect.interpenetration import Depth
-from hpccd_ros.detect.separation import Separation
+from hpccd_ros.detect.plane_patch import FACES as PATCH_FACES
+from hpccd_ros.detect.plane_patch import patch
+from hpccd_ros.detect.separation import Separation, Thickness
+from hpccd_ros.frames.types import NO_EDGES
+from hpccd_ros.middleware.contact_messages import times_of
 from hpccd_ros.picture import contacts as picture
 from hpccd_ros.picture.intersecting import IntersectingFaces
 from hpccd_ros.picture.visual_geometry import NO_VISUAL, VisualGeometry
@@ -48,7 +52,7 @@ def draw_step(
     drawn = picture.Picture(
         meshes,
         np.asarray(found.points),
-        np.concatenate([found.vf_toc, found.ee_toc]),
+        times_of(found),
         f"{step.total:,} contact{'' if step.total == 1 else 's'} in step {step.step}" + of,
         facts(step),
         title,
@@ -73,10 +77,13 @@ def facts(step: ReplayedStep) -> list[str]:
         f"{edges:,} lone edges" if edges else None,
         f"{len(found.vf):,} vertex-face",
         f"{len(found.ee):,} edge-edge",
+        f"{len(found.vp):,} vertex-plane" if step.planes else None,
+        f"{len(found.vv) + len(found.ve):,} of points" if len(found.vv) + len(found.ve) else None,
         f"first at t = {found.first_toc:.4f}" if step.total else None,
         f"{step.milliseconds:.1f} ms",
         f"accuracy {step.recorded.accuracy}" if step.recorded is not None else None,
         separation_fact(step.separation),
+        thickness_fact(step.thickness),
         features_fact(step.features),
         f"hash {found.hash:016x}",
     ]
@@ -90,6 +97,12 @@ def separation_fact(separation: Separation) -> str | None:
     return f"separation {separation.minimum:g}{others}" if separation.text else None
 
 
+def thickness_fact(thickness: Thickness) -> str | None:
+    """None where all meshes are infinitely thin."""
+    values = sorted({value for _, value in thickness if value})
+    return f"thickness {values[0]:g}{f' to {values[-1]:g}' if len(values) > 1 else ''}" if values else None
+
+
 def features_fact(features: tuple[str, ...]) -> str | None:
     """None where all are tested."""
     return None if features == FEATURES else f"only {' '.join(features).replace('_', '-')}"
@@ -98,8 +111,8 @@ def features_fact(features: tuple[str, ...]) -> str | None:
 def _marked(intersecting: IntersectingFaces, step: ReplayedStep, meshes) -> np.ndarray:
     """(F,) which of the drawn faces intersect another mesh; those of visual geometry do not."""
     names, topologies = step.layout.mesh_names, step.end_frame.topologies
-    places = [vertices for _, vertices, *_ in meshes_in_the_middle(step)]
-    of_mesh = dict(zip(names, zip(topologies, intersecting.of(topologies, places), strict=True), strict=True))
+    places = [vertices for _, vertices, *_ in meshes_in_the_middle(step)][: len(topologies)]
+    of_mesh = dict(zip(names, zip(topologies, intersecting.of(topologies, places), strict=True), strict=False))
     return np.concatenate(
         [
             of_mesh[name][1] if name in of_mesh and of_mesh[name][0].faces is faces else np.zeros(len(faces), bool)
@@ -110,19 +123,20 @@ def _marked(intersecting: IntersectingFaces, step: ReplayedStep, meshes) -> np.n
 
 def _seen(found: Sequence[Between], step: ReplayedStep, meshes) -> list[Between]:
     """Those between meshes that are drawn as they are tested, not by visual geometry."""
-    tested = dict(zip(step.layout.mesh_names, step.end_frame.topologies, strict=True))
+    tested = dict(zip(step.layout.mesh_names, step.end_frame.topologies, strict=False))  # planes come last
     drawn = {name for name, _, faces, _ in meshes if name in tested and tested[name].faces is faces}
     return [between for between in found if {between.mesh_a, between.mesh_b} <= drawn]
 
 
 def meshes_in_the_middle(step: ReplayedStep, visual: VisualGeometry = NO_VISUAL):
     """[(name, vertices (V,3), faces (F,3), edges (E,2) beside theirs)] in the middle of the step, so that contacts at
-    any time of it lie close to the surfaces. Robots by their visual geometry."""
-    start, end, names = step.start_frame, step.end_frame, step.layout.mesh_names
+    any time of it lie close to the surfaces. Robots by their visual geometry; then the planes."""
+    start, end = step.start_frame, step.end_frame
+    names = step.layout.mesh_names[: len(end.topologies)]
     before, after = (dict(zip(names, frame.vertices, strict=True)) for frame in (start, end))
     topologies = dict(zip(names, end.topologies, strict=True)) | visual.topologies
     before, after = before | visual.vertices(names, start), after | visual.vertices(names, end)
-    return [
+    meshes = [
         (
             name,
             0.5 * np.asarray(before[name], np.float64) + 0.5 * np.asarray(vertices, np.float64),
@@ -132,3 +146,5 @@ def meshes_in_the_middle(step: ReplayedStep, visual: VisualGeometry = NO_VISUAL)
         for name, vertices in after.items()
         if name in before
     ]
+    patches = ((plane.name, patch(plane, [vertices for _, vertices, *_ in meshes])) for plane in step.planes)
+    return meshes + [(name, corners, PATCH_FACES, NO_EDGES) for name, corners in patches if corners is not None]

@@ -5,6 +5,7 @@ import numpy as np
 from matplotlib.colors import to_rgb
 
 from hpccd_ros.base import extras
+from hpccd_ros.middleware.contact_messages import times_of
 from hpccd_ros.picture.contacts import TOC_COLOURS, linear, mesh_colours, srgb, toc_colours
 from hpccd_ros.picture.of_recording import meshes_in_the_middle
 from hpccd_ros.picture.shading import RADIUS, vertex_normals
@@ -25,8 +26,8 @@ class RerunWriter:
     """Writes steps, computed with outputs=("points", "normals"), to `path` (.rrd), or to a viewer it opens (None).
 
     Entities: meshes/NAME in the middle of the step, tinted around contacts; contacts/vertex_face, contacts/edge_edge,
-    coloured by toc; contacts/normals; curves of contacts, first_toc and milliseconds of the core. Timelines: step (the
-    number that the publisher gave), stamp (its end).
+    and those of planes and points, coloured by toc; contacts/normals; curves of contacts, first_toc and milliseconds of
+    the core. Timelines: step (the number that the publisher gave), stamp (its end).
     azimuth, elevation: degrees, from where the viewer looks first.
     Raises UserError where rerun-sdk is not installed, OSError where `path` cannot be written.
     """
@@ -59,7 +60,7 @@ class RerunWriter:
             self._look_at(vertices)
         stream.set_time("step", sequence=min(step.step, np.iinfo(np.int64).max))  # a publisher may count to 2**64
         stream.set_time("stamp", timestamp=np.datetime64(step.end, "ns"))
-        toc = np.concatenate([step.contacts.vf_toc, step.contacts.ee_toc])
+        toc = times_of(step.contacts)
         tint = Tint(np.asarray(step.contacts.points).reshape(-1, 3), toc_colours(toc), vertices)
         for colour, (name, own_vertices, faces, edges) in zip(
             mesh_colours([name for name, *_ in meshes]), meshes, strict=True
@@ -107,11 +108,15 @@ class RerunWriter:
 
     def _add_contacts(self, step):
         rr, found = self._rr, step.contacts
-        points, normals, n_vf = np.asarray(found.points), np.asarray(found.normals), len(found.vf)
-        toc = np.concatenate([found.vf_toc, found.ee_toc])
+        points, normals = np.asarray(found.points), np.asarray(found.normals)
+        n_vf, n_ee = len(found.vf), len(found.ee)
+        toc = times_of(found)
         colours = (255 * TOC_COLOURS(toc)[:, :3]).astype(np.uint8)
         radius = POINT_RADIUS * self._extent
-        for name, part in (("vertex_face", slice(0, n_vf)), ("edge_edge", slice(n_vf, None))):
+        kinds = [("vertex_face", slice(0, n_vf)), ("edge_edge", slice(n_vf, n_vf + n_ee))]
+        if step.planes or len(toc) > n_vf + n_ee:
+            kinds.append(("planes_and_points", slice(n_vf + n_ee, None)))
+        for name, part in kinds:
             self._stream.log(f"contacts/{name}", rr.Points3D(points[part], colors=colours[part], radii=radius))
         self._stream.log(
             "contacts/normals",

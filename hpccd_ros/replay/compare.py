@@ -10,7 +10,7 @@ from hpccd_core.results import OUTPUT_ARRAYS
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NO_BOUNDS, MotionBounds
 from hpccd_ros.middleware import contact_messages
-from hpccd_ros.middleware.result_fields import read_bounds, read_separation
+from hpccd_ros.middleware.result_fields import read_bounds, read_rest, read_separation, read_thickness
 
 
 def difference(
@@ -24,7 +24,7 @@ def difference(
     depends on the timing of its threads: there must be one if there is any, and it must be one of all `contacts`;
     outputs are not compared.
     """
-    total = len(contacts.vf) + len(contacts.ee)
+    total = len(contacts)
     then, now = list(recorded.topology_versions), list(layout.topology_versions)
     if then != now:
         return f"topology versions {then} were recorded, now they are {now}"
@@ -39,7 +39,7 @@ def difference(
     sent = count if recorded.truncated else 0
     contact_messages.fill_contacts(expected, contacts, layout, max_contacts=sent)
     then, now = contact_messages.read_contacts(recorded, layout), contact_messages.read_contacts(expected, layout)
-    for kind, describe in (("vf", _vertex_face), ("ee", _edge_edge)):
+    for kind, describe in _DESCRIBED.items():
         first = _first_difference(
             getattr(then, kind), getattr(then, kind + "_toc"), getattr(now, kind), getattr(now, kind + "_toc")
         )
@@ -95,6 +95,8 @@ def _malformed(message, layout) -> str | None:
             return f"{name} has {len(getattr(message, name))} entries for {count} contacts"
     try:
         read_separation(message)
+        read_thickness(message)
+        read_rest(message)
         read_bounds(message)
     except ValueError as error:
         return str(error)
@@ -112,13 +114,14 @@ def _malformed(message, layout) -> str | None:
     if len(message.distance):
         return f"distance has {len(message.distance)} entries; contacts of a step have none"
     kind = np.frombuffer(message.kind, np.uint8)
-    if (kind > message.EDGE_EDGE).any() or (np.diff(kind.astype(np.int16)) < 0).any():
-        return "kind is not a run of vertex-face followed by a run of edge-edge"
+    known = [contact_messages.KINDS[name][0] for name in contact_messages.TIMED]
+    if not np.isin(kind, known).all() or (np.diff(kind.astype(np.int16)) < 0).any():
+        return "kind has other values than those of contacts of a step, or is not ascending"
     return contact_messages.beyond_meshes(message, layout)
 
 
 def _not_any(recorded, contacts, layout) -> str | None:
-    count, total = len(recorded.kind), len(contacts.vf) + len(contacts.ee)
+    count, total = len(recorded.kind), len(contacts)
     if bool(count) != bool(total):
         return _count(count, total)
     if recorded.total < count or (recorded.total > count and not recorded.truncated):
@@ -127,7 +130,7 @@ def _not_any(recorded, contacts, layout) -> str | None:
     if recorded.first_toc != first:
         return f"first time of contact: recorded {recorded.first_toc!r}, that of the recorded contacts is {first!r}"
     then = contact_messages.read_contacts(recorded, layout)
-    for kind, describe in (("vf", _vertex_face), ("ee", _edge_edge)):
+    for kind, describe in _DESCRIBED.items():
         toc_of = dict(zip(map(tuple, getattr(contacts, kind)), getattr(contacts, kind + "_toc"), strict=True))
         for pair, toc in zip(map(tuple, getattr(then, kind)), getattr(then, kind + "_toc"), strict=True):
             if pair not in toc_of:
@@ -165,6 +168,24 @@ def _vertex_face(pair, layout) -> str:
 def _edge_edge(pair, layout) -> str:
     a, b, c, d = (_local(v, layout.vertex_offsets, layout) for v in pair)
     return f"edge ({a}, {b}) - edge ({c}, {d})"
+
+
+def _vertex_plane(pair, layout) -> str:
+    plane = layout.mesh_names[layout.planes[pair[1]]]
+    return f"vertex {_local(pair[0], layout.vertex_offsets, layout)} - plane {plane}"
+
+
+def _points(pair, layout) -> str:
+    a, b = (_local(v, layout.vertex_offsets, layout) for v in pair)
+    return f"point {a} - point {b}"
+
+
+def _point_edge(pair, layout) -> str:
+    v, a, b = (_local(v, layout.vertex_offsets, layout) for v in pair)
+    return f"point {v} - edge ({a}, {b})"
+
+
+_DESCRIBED = {"vf": _vertex_face, "ee": _edge_edge, "vp": _vertex_plane, "vv": _points, "ve": _point_edge}
 
 
 def _local(index, offsets, layout) -> str:

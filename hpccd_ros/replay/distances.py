@@ -10,11 +10,11 @@ from hpccd_core.options import ACCURACIES
 from hpccd_ros.bag.decode import make_decoder
 from hpccd_ros.bag.reader import RecordedTopic
 from hpccd_ros.detect.core import CORE_ERRORS
-from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.step_detector import StepDetector
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.middleware import fields
 from hpccd_ros.middleware.fields import InvalidMessageError
+from hpccd_ros.middleware.result_fields import read_thickness
 from hpccd_ros.middleware.snapshot_messages import fill_distances
 from hpccd_ros.replay.frames import PATIENCE, FrameWindow
 from hpccd_ros.replay.input_order import OrderedResult
@@ -115,14 +115,21 @@ class DistanceCheck:
         if accuracy not in ACCURACIES:
             self._differs(f"distances at {stamp} ns: accuracy {accuracy[:20]!r} is none of {', '.join(ACCURACIES)}")
             return
-        self._detector.options = dataclasses.replace(self._detector.options, accuracy=accuracy)
+        try:
+            thickness = read_thickness(result)
+        except ValueError as error:
+            self._differs(f"distances at {stamp} ns: the recorded result is malformed: {error}")
+            return
+        known = set(self._detector.mesh_names)
+        thickness = tuple(entry for entry in thickness if entry[0] in known)  # names are compared below
+        self._detector.options = dataclasses.replace(self._detector.options, accuracy=accuracy, thickness=thickness)
         try:
             gaps = self._detector.distances(frame)
         except CORE_ERRORS as error:
             self._lacks(f"distances at {stamp} ns: the core rejects it: {error}")
             return
         expected = type(result)()
-        fill_distances(expected, gaps, Layout.of(self._detector.mesh_names, frame.topologies))
+        fill_distances(expected, gaps, self._detector.layout_of(frame))
         if (why := difference(result, expected)) is None:
             self.verified += 1
         else:

@@ -10,14 +10,23 @@ from hpccd_ros.bag.decode import make_decoder
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.detect.core import CORE_ERRORS
 from hpccd_ros.detect.layout import Layout
-from hpccd_ros.detect.separation import NO_BOUNDS, NONE, MotionBounds, Separation
+from hpccd_ros.detect.rest_shapes import RestShapes
+from hpccd_ros.detect.scene import PlaneSettings
+from hpccd_ros.detect.separation import NO_BOUNDS, NONE, MotionBounds, Separation, Thickness
 from hpccd_ros.detect.step_detector import StepDetector
 from hpccd_ros.frames import taken_inputs
 from hpccd_ros.frames.samples import HISTORY_NS
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.middleware import fields
 from hpccd_ros.middleware.fields import InvalidMessageError
-from hpccd_ros.middleware.result_fields import read_features, read_inputs, read_report, read_separation
+from hpccd_ros.middleware.result_fields import (
+    read_features,
+    read_inputs,
+    read_report,
+    read_rest,
+    read_separation,
+    read_thickness,
+)
 from hpccd_ros.params.table import MOST_PARTS
 from hpccd_ros.replay.compare import difference, recorded_outputs
 from hpccd_ros.replay.distances import DistanceCheck
@@ -44,6 +53,8 @@ class ReplayedStep:
     contacts: object | None = None  # of the core, or None if a frame is missing
     layout: Layout | None = None
     separation: Separation = NONE  # in force
+    thickness: Thickness = ()  # as well
+    planes: tuple[PlaneSettings, ...] = ()
     features: tuple[str, ...] = FEATURES  # that were tested
     bounds: MotionBounds = NO_BOUNDS  # of motion by poses
     milliseconds: float = 0.0  # the core's call, wall time
@@ -55,7 +66,7 @@ class ReplayedStep:
 
     @property
     def total(self) -> int:
-        return len(self.contacts.vf) + len(self.contacts.ee) if self.contacts is not None else 0
+        return len(self.contacts) if self.contacts is not None else 0
 
 
 @dataclasses.dataclass(eq=False)
@@ -168,11 +179,12 @@ class Replay:
         self._ordered = self.recorded_results > 0 and self._lists_inputs()
         self.source = FrameSource(setup, recording.topics, self._ordered)
         builder = setup.builder
-        self._detector = StepDetector(builder, self._options(None))
-        self._every_contact = StepDetector(builder, self._options(None))
+        self._rest = RestShapes(builder.rest_of_frames)
+        self._detector = StepDetector(builder, self._options(None), self._rest)
+        self._every_contact = StepDetector(builder, self._options(None), self._rest)
         distance_topic = recording.topics.get(setup.distances) if distances else None
-        self.distances = DistanceCheck(distance_topic, StepDetector(builder, self._options(None)), accuracy)
-        self._mesh_names = setup.mesh_names
+        self.distances = DistanceCheck(distance_topic, StepDetector(builder, self._options(None), self._rest), accuracy)
+        self._mesh_names, self._planes = setup.mesh_names, builder.planes
         self._window = FrameWindow(max(WINDOW, 2 * setup.settings["frame_queue"]))
         self.any_one = setup.settings["report"] == "any"  # then "verified" means less: compare.py
         self.not_taken: Counter[str] = Counter()  # topic -> messages that the node did not take
@@ -200,7 +212,7 @@ class Replay:
                 continue
             if step.at > self._end:
                 break
-            step.number, number = number, number + 1
+            step.number, number, step.planes = number, number + 1, self._planes
             if step.missing is None:
                 self._compute(step)
             if step.missing is None:
@@ -317,8 +329,11 @@ class Replay:
     def _compute(self, step):
         end = step.end_frame
         self._detector.options = self._options(step.recorded)
+        if step.recorded is not None and (lack := self._lacks_rest(step)):
+            step.missing = step.uncertain = lack
+            return
         try:
-            self._detector.prepare_scene(end)
+            self._detector.prepare_scene(end, step.start_frame)
         except CORE_ERRORS as error:
             raise RecordingError(f"frame with stamp {end.stamp} ns: the core rejects it: {error}") from error
         try:
@@ -333,6 +348,19 @@ class Replay:
         step.contacts, step.layout, step.milliseconds = found.contacts, found.layout, found.detect_ms
         step.bounds = found.bounds
         step.separation, step.features = found.options.separation, found.options.features
+        step.thickness = found.options.thickness
+
+    def _lacks_rest(self, step) -> str | None:
+        """Why the shapes at rest of a recorded result are unknown, or None: its start gives them, or they are known."""
+        rest, topologies = self._rest, step.end_frame.topologies
+        recorded = self._valid(step.recorded, read_rest)[: len(topologies)]
+        if recorded and recorded != rest.stamps(topologies):
+            if all(stamp in (-1, step.start) for stamp in recorded):
+                rest.forget()
+            rest.look_at(step.start_frame)
+            if recorded != rest.stamps(topologies):
+                return "the recording lacks the frame that gave a mesh its shape at rest (mesh.NAME.ignored_at_rest)"
+        return None
 
     def _options(self, recorded):
         """The options of the recorded result, if there is one; an invalid accuracy or separation diverges:
@@ -342,22 +370,26 @@ class Replay:
             if not self._accuracy and recorded.accuracy in ACCURACIES:
                 options = dataclasses.replace(options, accuracy=recorded.accuracy)
             options = dataclasses.replace(options, report=read_report(recorded) or options.report)
-            separation, features = self._separation_of(recorded), read_features(recorded)
+            separation, features = self._valid(recorded, read_separation) or NONE, read_features(recorded)
             # In the same number of parts: the tolerance may have been different.
             rigid = dataclasses.replace(options.rigid, parts=min(recorded.parts, MOST_PARTS))
-            options = dataclasses.replace(options, separation=separation, features=features, rigid=rigid)
+            thickness = self._valid(recorded, read_thickness)
+            options = dataclasses.replace(
+                options, separation=separation, features=features, rigid=rigid, thickness=thickness
+            )
             self._outputs |= recorded_outputs(recorded)
         if self._features:
             options = dataclasses.replace(options, features=self._features)
         return dataclasses.replace(options, outputs=tuple(name for name in OUTPUTS if name in self._outputs))
 
-    def _separation_of(self, recorded) -> Separation:
+    def _valid(self, recorded, read):
+        """What ``read`` finds in a result of these meshes; an empty tuple if it is invalid."""
         if list(recorded.mesh_names) != self._mesh_names:
-            return NONE
+            return ()
         try:
-            return read_separation(recorded)
+            return read(recorded)
         except ValueError:
-            return NONE
+            return ()
 
     def _compare(self, step):
         if step.recorded is None:

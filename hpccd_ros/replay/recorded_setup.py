@@ -51,8 +51,8 @@ class ReplaySetup:
 
     @property
     def mesh_names(self) -> list[str]:
-        """In the order of the scene."""
-        return [mesh.name for mesh in self.builder.meshes]
+        """In the order of the scene, planes last."""
+        return list(self.builder.names)
 
     def options(self, accuracy: str, backend: str, threads: int) -> Options:
         """Detector options of the recorded node, but for what may differ without a change of the result."""
@@ -64,6 +64,7 @@ class ReplaySetup:
             separation=pair_parameters.separation(self.settings, robot_parameters.links(self.robots)),
             features=scene_parameters.features(self.settings),
             rigid=scene_parameters.rigid(self.settings),
+            thickness=pair_parameters.thickness(self.settings, robot_parameters.links(self.robots)),
         )
 
 
@@ -87,7 +88,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         if not settings["robots"] and all(row["static"] for row in meshes.values()):
             raise ParameterError("at least one mesh must not be static, otherwise nothing moves")
         scene_parameters.check(settings, meshes)
-        without_effect = values.unknown(given, meshes, settings["robots"])
+        without_effect = values.unknown(given, meshes, settings["robots"], settings["planes"])
         if parameter_file:  # what is stored may be of another version
             without_effect = unknown.check(without_effect, settings)
     except ParameterError as error:

@@ -35,6 +35,8 @@ COLUMNS = (
     "contacts",
     "vertex_face",
     "edge_edge",
+    "vertex_plane",
+    "of_points",
     "first_toc",
     "separation",
     "features",
@@ -84,6 +86,8 @@ class Table:
                         step.total,
                         len(found.vf),
                         len(found.ee),
+                        len(found.vp),
+                        len(found.vv) + len(found.ve),
                         repr(float(found.first_toc)),
                         step.separation.text,
                         " ".join(step.features),
@@ -91,7 +95,7 @@ class Table:
                         f"{found.hash:#018x}",
                     ]
                     if found is not None
-                    else [""] * 8
+                    else [""] * 10
                 ),
                 *([recorded.total, f"{recorded.hash:#018x}"] if recorded is not None else [""] * 2),
                 step.missing or step.difference or ("equal" if recorded is not None else ""),

@@ -239,6 +239,12 @@ def contacts(vf, ee, vf_toc, ee_toc):
     return SimpleNamespace(
         vf=np.array(vf, np.uint32).reshape(-1, 2),
         ee=np.array(ee, np.uint32).reshape(-1, 4),
+        vp=np.empty((0, 2), np.uint32),
+        vv=np.empty((0, 2), np.uint32),
+        ve=np.empty((0, 3), np.uint32),
+        vp_toc=np.empty(0),
+        vv_toc=np.empty(0),
+        ve_toc=np.empty(0),
         vf_toc=np.array(vf_toc, np.float64),
         ee_toc=np.array(ee_toc, np.float64),
         points=np.arange(3.0 * n).reshape(-1, 3),

@@ -14,7 +14,9 @@ from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.middleware import contact_messages, result_fields, snapshot_messages
 
-LAYOUT = Layout(("cloth", "ball", "floor"), np.array([0, 10, 14, 20]), np.array([0, 8, 12, 20]), (3, 0, 9))
+LAYOUT = Layout(
+    ("cloth", "ball", "floor"), np.array([0, 10, 14, 20]), np.array([0, 8, 12, 20]), topology_versions=(3, 0, 9)
+)
 UNUSED = ContactArray.NONE
 NEAR = hc.Proximity(
     vf=np.array([[3, 9], [12, 0]], np.uint32),

@@ -152,7 +152,7 @@ def test_parameter_files(page, tmp_path):
             file.write_text(block.text)
             given = read_parameters(file)
             settings, meshes = values.checked(given)
-            assert not values.unknown(given, meshes, settings["robots"])
+            assert not values.unknown(given, meshes, settings["robots"], settings["planes"])
 
 
 @each_page

@@ -10,7 +10,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from hpccd_ros.params import parameters, scene_parameters, values
-from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS, PAIR_ROWS, ROBOT_ROWS
+from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS, PAIR_ROWS, PLANE_ROWS, ROBOT_ROWS
 from hpccd_ros.params.values import ParameterError
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
@@ -34,7 +34,9 @@ def node_with():
     rclpy.shutdown(context=context)
 
 
-@pytest.mark.parametrize("row", [*NODE_ROWS, *MESH_ROWS, *PAIR_ROWS, *ROBOT_ROWS], ids=lambda row: row.name)
+@pytest.mark.parametrize(
+    "row", [*NODE_ROWS, *MESH_ROWS, *PAIR_ROWS, *PLANE_ROWS, *ROBOT_ROWS], ids=lambda row: row.name
+)
 def test_each_row_is_sound(row):
     assert values.unusable_value(row, row.default) is None
     assert row.text and not row.text.endswith(".")
@@ -42,7 +44,7 @@ def test_each_row_is_sound(row):
     assert described.read_only == (row.change == NEVER)
     if row.span is not None:
         assert values.unusable_value(row, row.span[1] + max(1, row.span[1])) is not None
-        assert values.unusable_value(row, row.span[0] - 1) is not None
+        assert values.unusable_value(row, row.span[0] - max(1, abs(row.span[0]))) is not None
     if row.choices:
         value = ["nonsense"] if row.kind == "string[]" else "nonsense"
         assert "nonsense" in values.unusable_value(row, value)
@@ -53,7 +55,7 @@ def test_each_row_is_sound(row):
 
 def test_defaults(node_with):
     settings, meshes = parameters.declare(node_with())
-    assert settings == {row.name: row.default for row in NODE_ROWS} | {"pairs": {}, "robot": {}}
+    assert settings == {row.name: row.default for row in NODE_ROWS} | {"pairs": {}, "plane": {}, "robot": {}}
     assert meshes == {}
 
 

@@ -13,7 +13,7 @@ import hpccd_core as hc
 from hpccd_ros.detect.interpenetration import Depth, polylines
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.frames.types import Topology
-from hpccd_ros.middleware.contact_messages import FeaturePairs, fill_pairs
+from hpccd_ros.middleware.contact_messages import FeaturePairs, fill_pairs, times_of
 
 # Level of zlib: 9 takes twice as long for 1 % less.
 LEVEL = 7
@@ -122,7 +122,7 @@ TIMES = 65535
 
 
 class ContactColumns:
-    """The vertex-face contacts of each step, then the edge-edge ones, with meshes and features as in ContactArray."""
+    """The vertex-face contacts of each step, then the others, with meshes and features as in ContactArray."""
 
     def __init__(self):
         self._meshes = [np.empty((0, 2), np.uint32)]
@@ -130,11 +130,11 @@ class ContactColumns:
         self._toc, self._points = [np.empty(0)], [np.empty((0, 3))]
 
     def add(self, contacts, layout: Layout) -> tuple[int, int]:
-        """How many vertex-face and edge-edge contacts of this step are drawn: at most MOST, evenly by time."""
-        toc = np.concatenate([contacts.vf_toc, contacts.ee_toc])
+        """How many vertex-face and other contacts of this step are drawn: at most MOST, evenly by time."""
+        toc = times_of(contacts)
         by_time = np.argsort(toc, kind="stable")
         kept = np.sort(by_time if len(toc) <= MOST else by_time[np.arange(MOST) * len(toc) // MOST])
-        pairs = FeaturePairs.of(vf=contacts.vf, ee=contacts.ee).keep(kept)
+        pairs = FeaturePairs.of_result(contacts).keep(kept)
         message = ContactArray()
         fill_pairs(message, pairs, layout)
         self._meshes.append(np.stack([message.mesh_a, message.mesh_b], axis=1).astype(np.uint32))
@@ -142,7 +142,7 @@ class ContactColumns:
         self._features.append(np.concatenate(sides, axis=1))
         self._toc.append(toc[kept])
         self._points.append(np.asarray(contacts.points).reshape(-1, 3)[kept])
-        return len(pairs.vf), len(pairs.ee)
+        return len(pairs.vf), len(pairs) - len(pairs.vf)
 
     def described(self) -> tuple[dict, dict[str, bytes]]:
         """(what the page says of them, {column: bytes})."""

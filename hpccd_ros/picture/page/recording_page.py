@@ -11,6 +11,9 @@ from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import shortened
 from hpccd_ros.base.whole_file import whole_file
+from hpccd_ros.detect.plane_patch import FACES as PATCH_FACES
+from hpccd_ros.detect.plane_patch import patch
+from hpccd_ros.frames.types import Topology
 from hpccd_ros.picture import curves
 from hpccd_ros.picture.contacts import BACKGROUND, FAINT, INK, INTERSECTING, TOC_COLOURS, mesh_colours, mesh_groups
 from hpccd_ros.picture.intersecting import IntersectingFaces
@@ -29,6 +32,8 @@ MOST_POSITIONS = 1 << 29
 GAP = "(dropped, not recorded, or started with another topology)"
 # Colours of times of contact between which the page blends.
 TOC_SHADES = 33
+
+_PATCH = Topology(0, 4, PATCH_FACES)
 
 
 class RecordingPage:
@@ -56,6 +61,7 @@ class RecordingPage:
         self._title, self._every = title, every
         self._view = {"azimuth": azimuth, "elevation": elevation}
         self._steps: list[dict] = []
+        self._patches: dict = {}
         self._first_end: int | None = None
         self._numbers: list[int] = []  # of all steps of the recording
         self._missing = self._differ = self._truncated = self._cut = 0
@@ -108,8 +114,10 @@ class RecordingPage:
         for number, mesh in enumerate(self._meshes):
             if frame is None:
                 mesh.add_nothing()
-            else:
+            elif number < len(frame.topologies):
                 mesh.add(frame.topologies[number], frame.vertices[number])
+            else:
+                self._add_plane(mesh, step.planes[number - len(frame.topologies)], frame)
         found = {} if frame is None else self._visual.vertices(self._names, frame)
         for name, mesh in self._seen.items():
             if name in found:
@@ -121,6 +129,16 @@ class RecordingPage:
                 f"the positions of {self.steps} steps fill the {MOST_POSITIONS >> 20} MB that a page may hold; "
                 f"show fewer of them: --every {2 * self._every}"
             )
+
+    def _add_plane(self, mesh, plane, frame):
+        """Where it was first drawn: a patch that follows the meshes would seem to move."""
+        if plane not in self._patches:
+            self._patches[plane] = patch(plane, frame.vertices)
+        corners = self._patches[plane]
+        if corners is None:
+            mesh.add_nothing()
+        else:
+            mesh.add(_PATCH, corners)
 
     def _time(self, step):
         if step.end_frame is None:

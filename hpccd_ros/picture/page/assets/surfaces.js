@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 "use strict";
 
+// In place of a second vertex, or of both for a plane, as in ContactArray.
+const NO_VERTEX = 4294967295;
+
 // The meshes of a step, each in its colour, tinted around contacts. Edges beside those of its faces
 // are lines between its vertices, and one without faces is drawn as its vertices.
 class Surfaces {
@@ -87,7 +90,7 @@ class Surfaces {
   // Vertices of a side of a contact: of a vertex, a face or an edge.
   vertices(contact, side, step) {
     const [first, second] = contact.features.slice(2 * side, 2 * side + 2);
-    if (!contact.vf) return [first, second];
+    if (!contact.vf) return [first, second].filter((vertex) => vertex !== NO_VERTEX);
     if (side === 0) return [first];
     return [...this.recording.shown(contact.meshes[1], step).topology.indices.subarray(3 * first, 3 * first + 3)];
   }

@@ -377,8 +377,10 @@ class Viewer {
 
   describe({ vf, meshes, features, toc, point }) {
     const [a, b] = meshes.map((mesh) => this.recording.meshes[mesh].name);
+    const side = (mesh, first, second) => (first === NO_VERTEX ? `plane ${mesh}`
+      : second === NO_VERTEX ? `vertex ${mesh}:${first}` : `edge ${mesh}:${first}-${second}`);
     const pair = vf ? `vertex ${a}:${features[0]} – face ${b}:${features[2]}`
-      : `edge ${a}:${features[0]}-${features[1]} – edge ${b}:${features[2]}-${features[3]}`;
+      : `${side(a, features[0], features[1])} – ${side(b, features[2], features[3])}`;
     const digits = Math.min(20, Math.max(0, Math.ceil(-Math.log10(this.recording.contacts.step))));
     const place = point.map((value) => (Math.abs(value) < 1e9 ? value.toFixed(digits) : value.toPrecision(6)));
     return `${pair}\nt = ${toc.toFixed(4)} of the step\nat ${place.join(", ")}`;
