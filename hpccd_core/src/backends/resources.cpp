@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/resources.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "base/simd.h"
@@ -25,11 +26,11 @@ Common::Common(std::shared_ptr<const Scene> of, const Options& wanted, int threa
   options.simd = resolve(wanted.simd);
   options.threads = pool.size();
   pool.heed(cancellation);
-  rules.set_thick(thickness.any());
+  rules.set_thick(thickness.meshes());
 }
 
 void Common::settle() {
-  rules.set_thick(thickness.any());
+  rules.set_thick(thickness.meshes());
   if (settled_ == separations.version()) return;
   rules.change(separations);
   separations.settle();
@@ -39,6 +40,7 @@ void Common::settle() {
 Separations Common::separations_now() const {
   Separations now;
   now.thickness = thickness.view();
+  now.may_be_zero = !(separations.first() > 0) && std::ranges::count(thickness.meshes(), Thick::some);
   if (separations.uniform()) {
     now.uniform = separations.first();
     return now;

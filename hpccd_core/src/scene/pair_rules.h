@@ -9,6 +9,7 @@
 #include "hpccd/hpccd.h"
 #include "scene/separation_table.h"
 #include "scene/tested_pairs.h"
+#include "scene/thickness.h"
 
 namespace hpccd {
 
@@ -53,12 +54,12 @@ class PairRules {
   // The rule of an enabled pair.
   Rule rule(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     Rule rule = one_rule_ ? *one_rule_ : rules_.of(mesh_a, mesh_b);
-    rule.separated |= thick_;
+    if (thick_) rule.separated |= thick_[mesh_a] != Thick::none || thick_[mesh_b] != Thick::none;
     return rule;
   }
   // Whether features may have a thickness. Pairs without it are then tested as without a separation (Worker::test), so
   // what follows from all rules remains.
-  void set_thick(bool thick) { thick_ = thick; }
+  void set_thick(const std::vector<Thick>& of_meshes) { thick_ = of_meshes.empty() ? nullptr : of_meshes.data(); }
   // Whether every contact has a time within 1e-12, so that pairs that cannot touch before a time can be skipped.
   bool promise_times() const { return promise_times_; }
   // Whether a tested pair has a tier whose results depend on the backend: "fast", without a separation.
@@ -74,7 +75,8 @@ class PairRules {
   PairTable<Rule> rules_;
   std::map<Rule, std::size_t> n_with_rule_;  // enabled pairs
   std::optional<Rule> one_rule_;             // of all of them
-  bool promise_times_ = true, any_fast_ = false, thick_ = false;
+  bool promise_times_ = true, any_fast_ = false;
+  const Thick* thick_ = nullptr;  // by mesh; null: none
 };
 
 }  // namespace hpccd

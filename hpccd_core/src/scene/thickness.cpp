@@ -34,7 +34,11 @@ void check_thickness(const Scene::Mesh& mesh, std::span<const double> values) {
 }
 
 ThicknessTable::ThicknessTable(const Scene& scene, const Features& features)
-    : scene_(scene), features_(features), given_(scene.meshes().size()), largest_of_mesh_(scene.meshes().size()) {
+    : scene_(scene),
+      features_(features),
+      given_(scene.meshes().size()),
+      largest_of_mesh_(scene.meshes().size()),
+      thick_(scene.meshes().size()) {
   for (std::uint32_t m = 0; m < given_.size(); ++m)
     if (const auto& values = scene.meshes()[m].thickness; !values.empty()) set(m, values);
 }
@@ -76,6 +80,14 @@ void ThicknessTable::set(std::uint32_t number, std::span<const double> values) {
          e < static_cast<std::size_t>(end_edge - features_.edges.begin()); ++e)
       if (const auto [a, b] = features_.edges[e]; a == b) of_edge_[e] = of_vertex_[a];
   largest_of_mesh_[number] = largest;
+  const auto positive = [](double t) { return t > 0; };
+  const bool all =
+      std::all_of(of_face_.begin() + mesh.first_face, of_face_.begin() + mesh.first_face + mesh.n_faces, positive) &&
+      std::all_of(of_vertex_.begin() + mesh.first_vertex, of_vertex_.begin() + mesh.first_vertex + mesh.n_vertices,
+                  positive) &&
+      std::all_of(of_edge_.begin() + (first_edge - features_.edges.begin()),
+                  of_edge_.begin() + (end_edge - features_.edges.begin()), positive);
+  thick_[number] = all ? Thick::all : largest > 0 ? Thick::some : Thick::none;
   largest_ = std::ranges::max(largest_of_mesh_);
 }
 

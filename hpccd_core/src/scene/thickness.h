@@ -19,6 +19,9 @@ struct Thicknesses {
   const double *of_vertex = nullptr, *of_edge = nullptr, *of_face = nullptr;
 };
 
+// Which features of a mesh have a thickness.
+enum class Thick : unsigned char { none, some, all };
+
 class ThicknessTable {
  public:
   ThicknessTable(const Scene& scene, const Features& features);
@@ -33,6 +36,8 @@ class ThicknessTable {
   double most_of_two() const { return 2 * largest_; }
   // By mesh: the largest of its features. Empty if all are zero.
   const std::vector<double>& largest_of_meshes() const { return any() ? largest_of_mesh_ : none_; }
+  // By mesh. Empty if all features have none.
+  const std::vector<Thick>& meshes() const { return any() ? thick_ : no_mesh_; }
   // Whether all features of a mesh have one thickness.
   bool even(std::uint32_t mesh) const { return given_[mesh].size() <= 1; }
   Thicknesses view() const {
@@ -51,6 +56,7 @@ class ThicknessTable {
   std::vector<double> of_vertex_, of_edge_, of_face_;        // empty until a value is not zero
   std::vector<std::array<std::uint32_t, 3>> edges_of_face_;  // found when faces first have a thickness each
   std::vector<double> largest_of_mesh_, none_;
+  std::vector<Thick> thick_, no_mesh_;
   double largest_ = 0;
   std::uint64_t version_ = 1;
 };

@@ -108,7 +108,7 @@ void Worker::keep(const std::uint32_t* first, const std::uint32_t* second, std::
 void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule) {
   heed_cancellation();
   if (kept) keep(first, second, n, kind, rule);
-  if (rule.separated && search_->geometry.separations.thick() && !search_->limits_fall)
+  if (rule.separated && search_->geometry.separations.may_be_zero)
     test_thick(first, second, n, kind, rule);
   else
     test_batch(geometry_of(first, second, n, kind), first, second, n, kind, rule);
@@ -118,12 +118,11 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
 void Worker::test_thick(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind,
                         Rule rule) {
   const Separations& separations = search_->geometry.separations;
-  const bool by_meshes = separations.mesh_of_vertex;
   limits_.resize(batch_capacity);
   std::uint32_t n_thick = 0;
   for (std::uint32_t i = 0; i < n; ++i) {
-    std::uint32_t v[4] = {};
-    if (by_meshes) pair_vertices(search_->geometry, kind, first[i], second[i], v);
+    std::uint32_t v[4];
+    pair_vertices(search_->geometry, kind, first[i], second[i], v);
     limits_[i] = separations.look_up(kind, first[i], second[i], v);
     n_thick += limits_[i] > 0;
   }
@@ -139,7 +138,6 @@ void Worker::test_thick(const std::uint32_t* first, const std::uint32_t* second,
   }
   std::erase_if(limits_, [](double limit) { return !(limit > 0); });
   if (n_thick > 0) test_batch(limited_, first_.data(), second_.data(), n_thick, kind, rule);
-  limited_.separations = {};
   rule.separated = false;
   test_batch(limited_, first_.data() + n_thick, second_.data() + n_thick, n - n_thick, kind, rule);
 }

@@ -17,15 +17,18 @@ namespace {
 
 #include "elementary/distance/search_lanes.inl"
 
-// The separation of a pair, by its position in the batch and its vertices.
-HPCCD_HD double separation_at(const Geometry& g, std::uint32_t at, const std::uint32_t* v) {
-  return g.separations.of_candidates ? g.separations.of_candidates[at] : g.separations.between(v[0], v[2]);
+// The separation of a pair, by its position in the batch, its features and their vertices.
+HPCCD_HD double separation_at(const Geometry& g, std::uint32_t at, Kind kind, std::uint32_t first, std::uint32_t second,
+                              const std::uint32_t* v) {
+  if (g.separations.of_candidates) return g.separations.of_candidates[at];
+  return g.separations.between(v[0], v[2]) + g.separations.thickness_of(kind, first, second);
 }
 
 // Lanes filled by of_lane(lane), for separations that differ between pairs.
 template <class OfLane>
 HPCCD_HD Double separations(const Geometry& g, OfLane&& of_lane) {
-  if (!g.separations.of_candidates && !g.separations.of_meshes) return Double(g.separations.uniform);
+  if (!g.separations.of_candidates && !g.separations.of_meshes && !g.separations.thick())
+    return Double(g.separations.uniform);
   alignas(64) double d[double_width];
   for (int lane = 0; lane < double_width; ++lane) d[lane] = of_lane(lane);
   Double r;
@@ -40,7 +43,10 @@ void test_separation(const Geometry& g, const std::uint32_t* first, const std::u
   PairList list;
   list_pairs<kind>(ApartByMore{load16(g.margin.in)}, g, g.vertices, first, second, n, list);
   const auto separations_of = [&](const auto& of) {
-    return separations(g, [&](int lane) { return separation_at(g, list.at[of[lane]], list.vertices[of[lane]]); });
+    return separations(g, [&](int lane) {
+      const std::uint32_t at = list.at[of[lane]];
+      return separation_at(g, at, kind, first[at], second[at], list.vertices[of[lane]]);
+    });
   };
 
   std::uint64_t none = 0;
@@ -101,7 +107,7 @@ void test_proximity(const Geometry& g, const std::uint32_t* first, const std::ui
     return separations(g, [&](int lane) {
       std::uint32_t v[4];
       pair_vertices<kind>(g, first[at[lane]], second[at[lane]], v);
-      return separation_at(g, at[lane], v);
+      return separation_at(g, at[lane], kind, first[at[lane]], second[at[lane]], v);
     });
   };
   const auto test = [&](const Snapshot<Double>& s, const std::uint32_t* at, unsigned valid) {

@@ -20,16 +20,17 @@ struct Separations {
   // For many meshes, in place of the table: a batch passes the separations of its candidates. Looking them up in the
   // code of the lanes would slow down every batch of distances by a tenth.
   PairValues<double> of_pairs = {};
-  Thicknesses thickness = {};  // likewise passed by candidate
+  Thicknesses thickness = {};
+  bool may_be_zero = false;  // of pairs with a rule for separations
 
   // The separation of two features, by one vertex of each.
   HPCCD_HD double between(std::uint32_t first, std::uint32_t second) const {
     return of_meshes ? of_meshes[mesh_of_vertex[first] * n_meshes + mesh_of_vertex[second]] : uniform;
   }
-  bool thick() const { return thickness.of_vertex; }
-  bool to_look_up() const { return of_pairs.keys || thick(); }
+  HPCCD_HD bool thick() const { return thickness.of_vertex; }
+  bool to_look_up() const { return of_pairs.keys; }
   // The thickness of both features, by number.
-  double thickness_of(Kind kind, std::uint32_t first, std::uint32_t second) const {
+  HPCCD_HD double thickness_of(Kind kind, std::uint32_t first, std::uint32_t second) const {
     if (!thick()) return 0;
     const double a = kind == Kind::vertex_face ? thickness.of_vertex[first] : thickness.of_edge[first];
     return a + (kind == Kind::edge_edge ? thickness.of_edge[second] : thickness.of_face[second]);
