@@ -53,11 +53,16 @@ class Cancellation:
 CORE_ERRORS = (ValueError, TypeError, RuntimeError, MemoryError)
 
 
+#: (mesh, ratio of its faces) of meshes that are tested on coarse faces.
+Detail = tuple[tuple[str, float], ...]
+
+
 @dataclass(frozen=True)
 class Options:
     """Arguments of hpccd_core.Detector, and settings that may change without a new detector: the separation of pairs of
     meshes and the ``thickness`` of meshes, as (mesh, thickness); whether the smallest ``distances`` at the end of a
-    step are computed too, and how steps with meshes that move by poses are cut.
+    step are computed too, and how steps with meshes that move by poses are cut. ``detail``: the coarse meshes, as
+    (mesh, ratio of faces).
     """
 
     accuracy: str = "exact"
@@ -70,6 +75,7 @@ class Options:
     features: tuple[str, ...] = FEATURES
     rigid: RigidOptions = RigidOptions()
     thickness: Thickness = ()
+    detail: Detail = ()
 
     @property
     def spacing(self) -> tuple[Separation, Thickness]:
@@ -95,6 +101,7 @@ def make_detector(scene: hc.Scene, options: Options) -> hc.Detector:
         outputs=options.outputs,
         minimum_separation=options.separation.minimum,
         features=options.features,
+        **({"detail": dict(options.detail)} if options.detail else {}),
     )
     for mesh_a, mesh_b, distance in options.separation.pairs:
         detector.set_separation(mesh_a, mesh_b, distance)

@@ -24,7 +24,7 @@ from hpccd_ros.node.configuration import Configuration
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.node.stop_doubts import WatchedScene
 from hpccd_ros.node.stop_state import Cause, StopState, Why
-from hpccd_ros.params import robot_parameters
+from hpccd_ros.params import pair_parameters, robot_parameters
 
 # In each time-out: half of it is promised, and two in a row may be late.
 REPEATS = 4
@@ -129,8 +129,9 @@ class StopWatch:
     def begin(self, builder: SceneBuilder) -> None:
         settings = self._configuration.settings
         self._scene_of = None
-        self._nearness = Nearness(builder, self._configuration.options, settings["stop_distance"])
         links = robot_parameters.links(self._configuration.robots)
+        detail = pair_parameters.stop_detail(settings, links)
+        self._nearness = Nearness(builder, self._configuration.options, settings["stop_distance"], detail)
         self._state.begin(WatchedScene.of(builder, settings, links))
 
     def end(self) -> None:

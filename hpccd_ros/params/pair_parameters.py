@@ -6,8 +6,9 @@ over that of its robot. The links of a robot are known once its description has 
 its links) has known robots, and settings of others have no effect yet.
 """
 
+import importlib.util
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -42,6 +43,7 @@ def check(settings: dict[str, Any], links: Links = NO_LINKS) -> None:
     pair_features(settings, links)
     separation(settings, links)
     thickness(settings, links)
+    stop_detail(settings, links)
 
 
 def ignored_pairs(
@@ -132,6 +134,17 @@ def separation(settings: dict[str, Any], links: Links = NO_LINKS) -> Separation:
     return Separation(settings["minimum_separation"], tuple((*one.names, one.value) for one in spread))
 
 
+def stop_detail(settings: dict[str, Any], links: Links = NO_LINKS) -> tuple[tuple[str, float], ...]:
+    """Parameter ``stop_detail`` as (mesh name, ratio). Raises ParameterError."""
+    if settings["stop_detail"] and settings["planes"]:
+        raise ParameterError(
+            "stop_detail: is not offered with planes; leave one of both out, or use a mesh as the floor"
+        )
+    if settings["stop_detail"] and importlib.util.find_spec("fast_simplification") is None:
+        raise ParameterError("stop_detail: needs the package fast-simplification; run pip install fast-simplification")
+    return _of_meshes(settings, links, "stop_detail", "RATIO", "a ratio above 0 and below 1", lambda x: 0 < x < 1)
+
+
 def _reject_planes(agreed: Iterable[_PairSetting], settings: dict[str, Any], what: str) -> None:
     for one in agreed:
         if plane := next((name for name in one.names if name in settings["planes"]), None):
@@ -139,37 +152,49 @@ def _reject_planes(agreed: Iterable[_PairSetting], settings: dict[str, Any], wha
 
 
 def thickness(settings: dict[str, Any], links: Links = NO_LINKS) -> tuple[tuple[str, float], ...]:
-    """Parameter ``thickness`` as (mesh name, thickness); a link's own has priority over that of its robot. Raises
-    ParameterError."""
+    """Parameter ``thickness`` as (mesh name, thickness). Raises ParameterError."""
+    what = f"a number from 0 to {FARTHEST:g} in the unit of the vertices"
+    return _of_meshes(settings, links, "thickness", "THICKNESS", what, lambda x: 0 <= x <= FARTHEST)
+
+
+def _of_meshes(
+    settings: dict[str, Any], links: Links, parameter: str, value: str, what: str, usable: Callable[[float], bool]
+) -> tuple[tuple[str, float], ...]:
+    """A parameter with entries NAME:VALUE as (mesh name, number); a link's own has priority over that of its robot.
+    Raises ParameterError."""
     given: dict[str, tuple[str, float]] = {}
-    for text in settings["thickness"]:
-        name, _, number = text.rpartition(":")
-        value = _distance(number)
-        if not _is_name(settings, name) or name in settings["planes"] or value is None:
+    for text in settings[parameter]:
+        name, _, word = text.rpartition(":")
+        number = _number(word)
+        if not _is_name(settings, name) or name in settings["planes"] or number is None or not usable(number):
             meant = _meant(settings, [name], text)
             if name in settings["planes"]:
                 meant = f"; {quoted(name)} is a plane, which has none: shift its offset, or use pair_separation"
             raise ParameterError(
-                f"thickness: {quoted(text)} must be NAME:THICKNESS with a mesh out of {_names(settings)} and a number "
-                f"from 0 to {FARTHEST:g} in the unit of the vertices{meant}"
+                f"{parameter}: {quoted(text)} must be NAME:{value} with a mesh out of {_names(settings)} and "
+                f"{what}{meant}"
             )
-        first = given.setdefault(name, (text, value))
-        if first[1] != value:
-            raise ParameterError(f"thickness: {quoted(text)} contradicts {quoted(first[0])}; leave one out")
+        first = given.setdefault(name, (text, number))
+        if first[1] != number:
+            raise ParameterError(f"{parameter}: {quoted(text)} contradicts {quoted(first[0])}; leave one out")
     found: dict[str, float] = {}
     for name in sorted(given, key=lambda name: name not in settings["robots"]):
-        text, value = given[name]
-        one = _PairSetting("thickness", text, (name, name), value)
-        found.update(dict.fromkeys(_meshes(name, one, settings, links), value))
+        text, number = given[name]
+        one = _PairSetting(parameter, text, (name, name), number)
+        found.update(dict.fromkeys(_meshes(name, one, settings, links), number))
     return tuple(found.items())
 
 
-def _distance(text: str) -> float | None:
+def _number(text: str) -> float | None:
     try:
-        number = float(text)
+        return float(text)
     except ValueError:
         return None
-    return number if 0 <= number <= FARTHEST else None
+
+
+def _distance(text: str) -> float | None:
+    number = _number(text)
+    return number if number is not None and 0 <= number <= FARTHEST else None
 
 
 def _structured(settings: dict[str, Any], key: str) -> Iterator[_PairSetting]:

@@ -488,6 +488,15 @@ STOP_ROWS = (
         example=1.0,
     ),
     Row(
+        "stop_detail",
+        "string[]",
+        [],
+        "Meshes that are searched for stop on coarse faces with a proven bound, as NAME:RATIO of their faces; the name "
+        "of a robot means all its links. stop is never later than without, and may be true a little earlier. Needs the "
+        "package fast-simplification",
+        example=["cloth:0.1"],
+    ),
+    Row(
         "clock_error",
         "float",
         CLOCK_ERROR,

@@ -67,6 +67,18 @@ def test_a_step_that_passes_through_is_true(start_stream):
     stream.expect(False)
 
 
+def test_on_coarse_faces(start_stream):
+    pytest.importorskip("fast_simplification", reason="coarse faces need the extra detail")
+    stream = start_stream(stop_detail=["hand:0.5", "table:0.5"])
+    stream.topologies()
+    for height in (2.0, 1.0):
+        stream.frame(height)
+    stream.expect(False)
+    stream.frame(NEAR)
+    stream.answered()
+    stream.expect(True)
+
+
 def test_only_different_meshes_that_are_tested(start_stream):
     """The hand alone folds so that parts of it are near each other all the time."""
     fan = np.array([[0, 1, 2], [3, 4, 5]], np.uint32)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of planes and thickness: the scene they describe, and bad values."""
+"""Parameters of planes, thickness and coarse meshes: the scene they describe, and bad values."""
 
 import math
 
@@ -76,6 +76,11 @@ def test_markers_show_nearest_points_of_thick_meshes():
         ({"thickness": ["cloth:nan"]}, "a number from 0 to 1e+150"),
         ({"thickness": ["cloth 0.1"]}, "did you mean cloth:0.1?"),
         ({"thickness": ["cloth:1", "cloth:2"]}, "'cloth:2' contradicts 'cloth:1'; leave one out"),
+        (
+            {"stop_detail": ["cloth:1.5"]},
+            "'cloth:1.5' must be NAME:RATIO with a mesh out of cloth, ball and a ratio above 0",
+        ),
+        ({"stop_detail": ["cloth:0.1"], "planes": ["floor"]}, "stop_detail: is not offered with planes"),
         ({"planes": ["floor"], "thickness": ["floor:1"]}, "'floor' is a plane, which has none: shift its offset"),
     ],
 )
