@@ -16,6 +16,12 @@ bounds, as it is written in a program or for the node. These may be bounded, as 
   spurious    of the reported contacts, those that are none (false positives)
   late, early how much later or earlier a time is than true (step = 1)
   error       the larger of both
+  deviation   how far a coarse surface is from the mesh, as a share of the scene's diagonal
+
+With a bound on deviation, coarse meshes (--detail) are tried too. Their faces are not those of the meshes, so they are
+judged by --ask meshes, which different meshes touch, and when first, or any_meshes, whether any two do; no mesh is
+tested against itself. With exact and conservative, coarse meshes miss none and are never late; they may be early or
+spurious.
 
 Of settings that are equally fast to 5 % it takes the more accurate one. To ask for less than all contacts (--ask) is a
 choice of the model: errors then count against what is asked. Name several where each of them would do.
@@ -23,8 +29,12 @@ choice of the model: errors then count against what is asked. Name several where
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
+import numpy as np
+
+from hpccd_core.detail_levels import simplifier
 from hpccd_core.options import ACCURACIES, SIMD
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.whole_file import whole_file
@@ -41,9 +51,15 @@ DECIDED = {
     "tolerance": "by_tolerance",
     "integers": "by_integers",
 }
-COLUMNS = {key: key for key in ("scene", "backend", "simd", "accuracy", "asked")}
+COLUMNS = {key: key for key in ("scene", "backend", "simd", "accuracy", "asked", "detail")}
 COLUMNS |= {"ms a step": "step_ms", "/ balanced": "over_balanced", "contacts": "contacts", "missed": "missed"}
-COLUMNS |= {"spurious": "invented", "toc worst": "toc_worst", "toc p99": "toc_p99"}
+COLUMNS |= {"spurious": "invented", "toc worst": "toc_worst", "toc p99": "toc_p99", "deviation": "deviation"}
+# Of the picture.
+FLOOR = 1e-17
+MARKERS = dict(zip((asked.name for asked in choice.ASKED), "o^vsDPX", strict=True))
+NAMES = {name: f"{name} (number: detail)" for name in choice.OF_MESHES}
+FILLS = dict(zip(measure.BACKENDS, ("full", "left", "none"), strict=True))
+DETAILS = "0.3,0.1,0.03"  # tried where a bound on deviation is named
 
 
 def configure(parser):
@@ -54,8 +70,13 @@ def configure(parser):
     add("--tiers", default=",".join(ACCURACIES), metavar="NAME,...", help="default: %(default)s")
     add("--backend", metavar="NAME,...", help="of cpu, hybrid, gpu (default: cpu; with --choose: those that work here)")
     add("--ask", default=choice.ALL, metavar="NAME,...", help=f"contacts to ask for: {what} (default: all)")
+    add("--detail", metavar="RATIO,...", help=f"parts of the faces that stay (default: with a deviation: {DETAILS})")
     add("--simd", default="auto", metavar="NAME,...", help=f"of {', '.join(SIMD)}")
-    add("--picture", metavar="FILE", help="draw time against errors into a .png, .pdf or .svg file")
+    add(
+        "--picture",
+        metavar="FILE",
+        help="draw time against error, and the Pareto front, into a .png, .pdf or .svg file",
+    )
 
 
 def run(args) -> Report:
@@ -63,6 +84,9 @@ def run(args) -> Report:
     names = command.listed("--ask", args.ask, [a.name for a in choice.ASKED])
     asked = [a for a in choice.ASKED if a.name in names]
     tiers = command.listed("--tiers", args.tiers, ACCURACIES)
+    parts = details(args.detail or (DETAILS if any(b.quantity == "deviation" for b in bounds) else ""))
+    if parts and not any(a.of_meshes for a in asked):
+        asked.append(next(a for a in choice.ASKED if a.of_meshes))
     which = args.backend or (",".join(measure.BACKENDS) if bounds else "cpu")
     backends, rejected = command.usable("backend", which, measure.BACKENDS)
     sets, rejected_sets = command.usable("simd", args.simd, SIMD)
@@ -76,14 +100,22 @@ def run(args) -> Report:
         command.skipped(report, "backend", rejected)
     command.skipped(report, "instruction set", rejected_sets)
     for source in found:
+        one_mesh = len(source.first().meshes) == 1
         variants = {
-            (backend, simd, tier, what.name): what
+            (backend, simd, tier, what.name, detail): what
             for what in asked
+            if not (what.of_meshes and one_mesh)
             for backend in backends
             for simd in (sets if backend == "cpu" else ["auto"])
             for tier in tiers
+            for detail in (choice.FULL, *(parts if what.of_meshes else ()))
         }
-        _measure(report, source, variants, args)
+        if variants:
+            _measure(report, source, variants, args)
+        else:
+            report.note(f"{source.name}: has one mesh; which different meshes touch is not asked")
+    if not report.rows:
+        raise UserError("nothing to measure: --ask names questions about different meshes, and no scene has two")
     check(report)
     caption = "missed, spurious, toc: against the truth of the file, or else against the tier exact"
     show("tiers", COLUMNS, report.rows, caption)
@@ -94,22 +126,51 @@ def run(args) -> Report:
     return report
 
 
+def details(text: str) -> list[float]:
+    """Parts of the faces, each in (0, 1), as the text names them. UserError for others, or if meshes cannot be made
+    coarse here."""
+    found: list[float] = []
+    for word in (word.strip() for word in text.split(",") if word.strip()):
+        try:
+            found.append(float(word))
+        except ValueError:
+            found.append(math.nan)
+        if not 0 < found[-1] < 1:
+            raise UserError(f"--detail {text}: {word!r} is no part of the faces; name parts between 0 and 1, as in 0.1")
+    if found:
+        try:
+            simplifier()
+        except ImportError as error:
+            raise UserError(f"--detail {text}: {error}") from error
+    return found
+
+
 def _measure(report, source, variants, args):
     runners = {}
     for variant, what in variants.items():
         options = dict(zip(("backend", "simd", "accuracy"), variant, strict=False)) | {"threads": args.threads}
-        runners[variant] = measure.Runner(variant, {**options, **what.options})
+        options |= {} if variant[-1] == choice.FULL else {"detail": variant[-1]}
+        runners[variant] = measure.Runner(variant, {**options, **what.options}, scene=what.change)
     series = measure.measure(source, list(runners.values()), args.repeat, args.steps)
     steps = {number: source.step(number) for number in next(iter(series.values())).by_step}
     known = {number: step.truth or _exact(step) for number, step in steps.items()}
-    for (backend, simd, tier, name), what in variants.items():
-        one, runner = series[backend, simd, tier, name], runners[backend, simd, tier, name]
-        errors = [what.errors(measure.detect(runner.detector(steps[k]), steps[k]), true) for k, true in known.items()]
-        balanced = series.get((backend, simd, "balanced", name))
+    for variant, what in variants.items():
+        backend, simd, tier, name, detail = variant
+        one, errors, deviations = series[variant], [], [0.0]
+        for k, true in known.items():
+            detector = runners[variant].detector(steps[k])
+            found = measure.detect(detector, steps[k])
+            faces = None if detail == choice.FULL else detector.faces
+            errors.append(what.errors(found, true, steps[k], faces))
+            if detail != choice.FULL:
+                diagonal = np.linalg.norm(np.ptp(steps[k].vertices_t0.astype(float), axis=0))
+                deviations.append(float(found.bounds.max(initial=0.0) / diagonal))
+        balanced = series.get((backend, simd, "balanced", name, choice.FULL))
         stats, row = one.stats(), one.row()
         report.add(
             part="scene",
             **{"scene": source.name, "backend": backend, "simd": simd, "accuracy": tier, "asked": name},
+            **{"detail": detail, "deviation": max(deviations)},
             threads=args.threads or cores(),
             truth="file" if next(iter(steps.values())).truth else "exact tier",
             reported=sum(sample[0].contacts for sample in one.by_step.values()),
@@ -130,7 +191,12 @@ def check(report: Report) -> None:
     """The promises of the tiers, on all steps that were measured."""
     for r in report.rows:
         what = f"missed {r['missed']}, spurious {r['invented']}, off by {r['toc_worst']:g}"
-        text = f"{r['scene']}: {r['accuracy']}: {what}"
+        coarse = r["detail"] != choice.FULL
+        text = f"{r['scene']}: {r['accuracy']}{', detail {:g}'.format(r['detail']) if coarse else ''}: {what}"
+        if coarse:  # none missed, none late
+            if r["accuracy"] in ("exact", "conservative") and (r["missed"] or r["latest"] > 1e-12):
+                report.failure(f"{text}, latest by {r['latest']:g}")
+            continue
         if r["accuracy"] == "exact" and (r["missed"] or r["invented"] or r["toc_worst"] > 1e-12):
             report.failure(text)
         if r["accuracy"] == "conservative" and (r["missed"] or r["latest"] > 0):
@@ -138,36 +204,74 @@ def check(report: Report) -> None:
 
 
 def draw(rows: list[dict], path: Path) -> None:
-    """Plot the time of each setting against its share of wrong contacts and its worst error of times.
-
-    Zero has no place on a logarithmic axis: it is drawn at the value that the label of the axis names. Filled markers
-    report all contacts, hollow ones fewer.
+    """Plot, for each scene, the time of each setting against its worst error: the share of missed or of spurious
+    contacts, the error of a time in steps, or the deviation as a share of the diagonal. Both axes are logarithmic; what
+    has no error is drawn at FLOOR. Settings that ask for the same have one marker, and a line: their Pareto front.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import LogLocator, NullLocator
 
     from hpccd_ros.picture.contacts import as_bytes
 
-    page = Figure(figsize=(10, 4), layout="constrained")
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    down = -(-len(scenes) // 4)
+    across = -(-len(scenes) // down)
+    page = Figure(figsize=(1.5 + 3 * across, 0.9 + 2.6 * down), layout="constrained")
     FigureCanvasAgg(page)
-    panels = (
-        ("missed and spurious contacts, share", 1e-7, lambda o: o.wrong),
-        ("worst error of times, in steps", 1e-17, lambda o: o.values["error"]),
-    )
-    marks = {}
-    for axis, (label, floor, value) in zip(page.subplots(1, 2), panels, strict=True):
-        for o in choice.outcomes(rows):
-            setting, colour = o.setting, f"C{ACCURACIES.index(o.setting.accuracy)}"
-            mark = "osD"[measure.BACKENDS.index(setting.backend)]
-            inside = colour if setting.asked == choice.ALL else "none"
-            point = axis.loglog(o.ms, max(value(o), floor), mark, color=colour, markerfacecolor=inside, alpha=0.8)
-            if setting.asked == choice.ALL:
-                marks[f"{setting.accuracy}, {setting.backend}"] = point[0]
-        axis.set_xlabel("ms a step")
-        axis.set_ylabel(f"{label} (0 at {floor:g})")
+    axes = page.subplots(down, across, sharey=True, squeeze=False).ravel()
+    gray = {"color": "gray", "linestyle": "none"}
+    marks = {tier: Line2D([], [], color=f"C{i}", marker="o", linestyle="none") for i, tier in enumerate(ACCURACIES)}
+    for backend in sorted({row["backend"] for row in rows} - {"cpu"}):
+        marks[f"on {backend}"] = Line2D([], [], marker="o", fillstyle=FILLS[backend], **gray)
+    for asked in (a.name for a in choice.ASKED if any(row["asked"] == a.name for row in rows)):
+        marks[NAMES.get(asked, asked)] = Line2D([], [], marker=MARKERS[asked], **gray)
+    marks["Pareto front"] = Line2D([], [], color="gray", linewidth=1)
+    for axis, scene in zip(axes, scenes, strict=False):
+        # The least time of a step is disturbed less by other programs than the median.
+        mine = [row | {"step_ms": row.get("least_ms", row["step_ms"])} for row in rows if row["scene"] == scene]
+        found = choice.outcomes(mine)
+        for asked in (a.name for a in choice.ASKED):
+            mine = [o for o in found if o.setting.asked == asked]
+            _draw_settings(axis, mine)
+        axis.set(xscale="log", yscale="log", ylim=(FLOOR / 5, 5))
+        axis.set_title(scene, fontsize=9)
+        axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.xaxis.set_major_formatter("{x:g}")
+        axis.xaxis.set_minor_locator(NullLocator())
+        axis.yaxis.set_major_locator(LogLocator(numticks=10))
+        axis.tick_params(labelsize=8)
+        axis.grid(True, which="major", alpha=0.3)
+    for axis in axes[len(scenes) :]:
+        axis.set_axis_off()
+    page.supxlabel("ms a step, the least of all rounds", fontsize=9)
+    page.supylabel(f"worst error (0 at {FLOOR:g})", fontsize=9)
     page.legend(marks.values(), marks, loc="outside right center", fontsize=8)
     try:
         with whole_file(path, overwrite=True) as draft:
             draft.write_bytes(as_bytes(page, draft.suffix, dpi=150))
     except (OSError, ValueError) as error:
         raise UserError(f"--picture {path}: cannot be written: {error}") from error
+
+
+def _draw_settings(axis, found: list[choice.Outcome]) -> None:
+    """Those that ask for the same, and the line through their Pareto front."""
+    for o in found:
+        setting, colour = o.setting, f"C{ACCURACIES.index(o.setting.accuracy)}"
+        look = {"marker": MARKERS[setting.asked], "fillstyle": FILLS[setting.backend], "markersize": 6}
+        axis.plot(o.ms, _worst(o), color=colour, alpha=0.8, linestyle="none", **look)
+        if setting.detail != choice.FULL and setting.accuracy == "exact":
+            below = setting.asked == choice.OF_MESHES[-1]
+            place = {"textcoords": "offset points", "xytext": (3, -11 if below else 5), "fontsize": 7}
+            axis.annotate(f"{setting.detail:g}", (o.ms, _worst(o)), **place)
+    least, line = math.inf, []
+    for o in sorted(found, key=lambda o: (o.ms, _worst(o))):
+        if _worst(o) < least:
+            least = _worst(o)
+            line.append(o)
+    axis.plot([o.ms for o in line], [_worst(o) for o in line], color="gray", linewidth=1, zorder=0)
+
+
+def _worst(o: choice.Outcome) -> float:
+    return max(FLOOR, *(o.values[name] for name in ("misses", "spurious", "error", "deviation")))

@@ -11,6 +11,8 @@ import math
 import re
 from collections.abc import Sequence
 
+import numpy as np
+
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import report as output
 from hpccd_ros.bench import truth
@@ -19,15 +21,32 @@ from hpccd_ros.bench import truth
 @dataclasses.dataclass(frozen=True, eq=False)
 class Asked:
     """The requested contacts of a step. Errors are relative to these, not to all contacts: requesting fewer is a choice
-    of the model. kinds: of contacts. one: "" for all of them, or one of them: "earliest", "any"."""
+    of the model. kinds: of contacts. one: "" for all of them, or one of them: "earliest", "any". of_meshes: only which
+    different meshes touch, and when first; no mesh is tested against itself."""
 
     name: str
     options: dict = dataclasses.field(default_factory=dict)
     kinds: tuple[str, ...] = ("vf", "ee")
     one: str = ""
+    of_meshes: bool = False
 
-    def errors(self, found, true: dict) -> truth.Errors:
-        """found: hpccd_core.Contacts; true: all contacts of the step."""
+    def change(self, scene) -> None:
+        """Change the core's scene to what is asked for."""
+        if self.of_meshes:
+            for name in scene.mesh_names:
+                scene.ignore_pair(name, name)
+
+    def errors(self, found, true: dict, step=None, faces=None) -> truth.Errors:
+        """found: hpccd_core.Contacts; true: all contacts of the step. Of meshes: the step, and the faces (F,3) to which
+        the result refers, by default those of the step."""
+        if self.of_meshes:
+            mesh = np.repeat(np.arange(len(step.meshes)), [mesh.n_vertices for mesh in step.meshes])
+            own = step.faces()
+            of_pairs = truth.of_pairs_of_meshes(found, true, mesh, own, own if faces is None else faces)
+            if not self.one:
+                return of_pairs
+            there, here = of_pairs.true > 0, of_pairs.true - of_pairs.missed + of_pairs.invented > 0
+            return truth.errors(int(there), int(there and not here), int(here and not there), np.empty(0))
         wanted = {key: values for key, values in true.items() if key.split("_")[0] in self.kinds}
         return truth.of_one(found, wanted, self.one == "earliest") if self.one else truth.of_scene(found, wanted)
 
@@ -39,8 +58,11 @@ ASKED = (
     Asked("any", {"report": "any"}, one="any"),
     Asked("vertex_face", {"features": ("vertex_face",)}, kinds=("vf",)),
     Asked("edge_edge", {"features": ("edge_edge",)}, kinds=("ee",)),
+    Asked("meshes", of_meshes=True),
+    Asked("any_meshes", {"report": "any"}, one="any", of_meshes=True),
 )
-ALL = ASKED[0].name
+ALL, OF_MESHES = ASKED[0].name, tuple(asked.name for asked in ASKED if asked.of_meshes)
+FULL = 1.0  # detail: the part of the faces that stays
 # Quantities that may be bounded, as --help explains. The worst of several scenes counts.
 QUANTITIES = {
     "misses": lambda row: row["missed"] / max(1, row["true"]),
@@ -48,6 +70,7 @@ QUANTITIES = {
     "late": lambda row: row["latest"],
     "early": lambda row: row["earliest"],
     "error": lambda row: row["toc_worst"],
+    "deviation": lambda row: row.get("deviation", 0.0),
 }
 EXAMPLE = '--choose "misses<1e-4, late<1e-3"'
 # Settings within this ratio count as equally fast: the more accurate one is selected.
@@ -57,14 +80,20 @@ _BOUND = re.compile(r"(?P<quantity>[a-z]+)\s*(?P<sign><=?)\s*(?P<limit>[^<=>\s]+
 
 @dataclasses.dataclass(frozen=True)
 class Setting:
-    """A tier, a backend, and the requested contacts."""
+    """A tier, a backend, the requested contacts, and the detail of all meshes."""
 
     accuracy: str
     backend: str
     asked: str = ALL
+    detail: float = FULL
 
     def __str__(self):
-        return f"{self.accuracy} on {self.backend}" + ("" if self.asked == ALL else f", {self.asked}")
+        detail = "" if self.detail == FULL else f", detail {self.detail:g}"
+        return f"{self.accuracy} on {self.backend}" + ("" if self.asked == ALL else f", {self.asked}") + detail
+
+    @staticmethod
+    def of(row: dict) -> Setting:
+        return Setting(row["accuracy"], row["backend"], row.get("asked", ALL), row.get("detail", FULL))
 
     def as_written(self) -> str:
         """The setting as Python code and as parameters of the node."""
@@ -72,10 +101,14 @@ class Setting:
         options = {"accuracy": self.accuracy, "backend": self.backend, **asked}
         python, node = [], []
         for name, value in options.items():
-            word = isinstance(value, str)
-            python.append(f'{name}="{value}"' if word else f"{name}={value!r}")
-            node.append(f"-p {name}:={value}" if word else f'-p {name}:="[{", ".join(value)}]"')
-        return f"hc.Detector(scene, {', '.join(python)}); hpccd_node --ros-args {' '.join(node)}"
+            several = isinstance(value, tuple)
+            python.append(f'{name}="{value}"' if isinstance(value, str) else f"{name}={value!r}")
+            node.append(f'-p {name}:="[{", ".join(value)}]"' if several else f"-p {name}:={value}")
+        if self.detail != FULL:
+            python.append(f"detail={self.detail:g}")
+            node.append(f'-p stop_detail:="[NAME:{self.detail:g}]" for each mesh NAME')
+        alone = "; all meshes with self_collision false" if self.asked in OF_MESHES else ""
+        return f"hc.Detector(scene, {', '.join(python)}); hpccd_node --ros-args {' '.join(node)}{alone}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -142,7 +175,7 @@ def outcomes(rows: Sequence[dict]) -> list[Outcome]:
     with the first of several instruction sets."""
     of: dict[Setting, dict[str, dict]] = {}
     for row in rows:
-        of.setdefault(Setting(row["accuracy"], row["backend"], row.get("asked", ALL)), {}).setdefault(row["scene"], row)
+        of.setdefault(Setting.of(row), {}).setdefault(row["scene"], row)
     found = {setting: mine.values() for setting, mine in of.items() if mine.keys() == {row["scene"] for row in rows}}
     return [
         Outcome(
@@ -155,10 +188,11 @@ def outcomes(rows: Sequence[dict]) -> list[Outcome]:
 
 
 def front(found: Sequence[Outcome]) -> list[Outcome]:
-    """Those that no other one which asks for the same beats in time, in wrong results and in the error of times."""
+    """The Pareto front: settings that no other one which asks for the same beats in time, in wrong results, in the
+    error of times and in the deviation of the meshes."""
 
     def values(o: Outcome) -> tuple[float, ...]:
-        return o.ms, o.wrong, o.values["error"]
+        return o.ms, o.wrong, o.values["error"], o.values["deviation"]
 
     def beats(a: Outcome, b: Outcome) -> bool:
         alike = a.setting.asked == b.setting.asked and values(a) != values(b)
@@ -187,6 +221,10 @@ def nearest(found: Sequence[Outcome], bounds: Sequence[Bound]) -> Outcome:
 def choose(report, bounds: Sequence[Bound]) -> None:
     """Prints, and marks the rows of the chosen setting in the report, which fails where none keeps the bounds."""
     rows = report.rows
+    if not any(row["true"] for row in rows if row["asked"] in OF_MESHES):  # coarse meshes cannot be judged
+        rows = [row for row in rows if row["asked"] not in OF_MESHES] or rows
+        if len(rows) < len(report.rows):
+            report.note("no two meshes touch in the steps measured: coarse meshes are left out of the choice")
     found = outcomes(rows)
     # The request with the fewest true contacts in the scene that has most of them, and their number.
     most: dict[str, float] = {}
@@ -215,7 +253,7 @@ def choose(report, bounds: Sequence[Bound]) -> None:
         report.failure(f"--choose: no setting keeps {wanted}; the nearest is {it}")
         return
     for row in rows:
-        row["chosen"] = Setting(row["accuracy"], row["backend"], row["asked"]) == taken.setting
+        row["chosen"] = Setting.of(row) == taken.setting
     print(f"{wanted}: {taken.setting.as_written()}")
 
 
@@ -225,11 +263,11 @@ def _show(found: Sequence[Outcome], taken: Outcome | None, bounds: Sequence[Boun
         broken = ", ".join(map(str, o.broken(bounds)))
         verdict = "chosen" if o is taken else f"breaks {broken}" if broken else "keeps them"
         setting = {**dataclasses.asdict(o.setting), "ms a step": o.ms, **o.values}
-        rows.append({**setting, "front": "*" if o in unbeaten else "", "bounds": verdict})
+        rows.append({**setting, "Pareto front": "*" if o in unbeaten else "", "bounds": verdict})
     output.show(
         "all settings, the cheapest first",
         {key: key for key in rows[0]},
         rows,
-        "shares, of the worst scene, against the truth of the file or else the tier exact; front: no other setting "
-        "that asks for the same is at least as good in everything",
+        "shares, of the worst scene, against the truth of the file or else the tier exact; Pareto front: no other "
+        "setting that asks for the same is at least as good in everything",
     )

@@ -51,6 +51,40 @@ def of_one(found, truth: dict[str, np.ndarray], earliest: bool) -> Errors:
     return errors(there, missed, of_named.invented, late)
 
 
+def of_pairs_of_meshes(found, truth: dict[str, np.ndarray], mesh_of_vertex, faces, found_faces) -> Errors:
+    """Errors of a result that must name the pairs of different meshes that touch. Times: the first of each pair.
+
+    faces (F,3), found_faces: to which the rows of the truth and of the result refer, in scene-wide vertices.
+    """
+    there = _first_of_meshes(truth, mesh_of_vertex, faces)
+    rows = {f"{kind}{end}": getattr(found, kind + end, ()) for kind in ("vf", "ee") for end in ("", "_toc")}
+    here = _first_of_meshes({**rows, "ef": getattr(found, "ef", ())}, mesh_of_vertex, found_faces)
+    late = np.array([here[pair] - there[pair] for pair in sorted(there.keys() & here.keys())])
+    return errors(len(there), len(there.keys() - here.keys()), len(here.keys() - there.keys()), late)
+
+
+def _first_of_meshes(rows, mesh_of_vertex, faces) -> dict[tuple[int, int], float]:
+    """By pair of different meshes, the first time. Faces that an edge intersects at the start are there at time 0."""
+    first: dict[tuple[int, int], float] = {}
+    for kind, second in (
+        ("vf", lambda r: faces[r[:, 1], 0]),
+        ("ee", lambda r: r[:, 2]),
+        ("ef", lambda r: faces[r[:, 2], 0]),
+    ):
+        of_kind = np.asarray(rows.get(kind, ()), np.int64)
+        if not len(of_kind):
+            continue
+        pairs = np.sort(np.stack([mesh_of_vertex[of_kind[:, 0]], mesh_of_vertex[second(of_kind)]], 1), axis=1)
+        toc = np.zeros(len(pairs)) if kind == "ef" else np.asarray(rows[f"{kind}_toc"])
+        named, which = np.unique(pairs, axis=0, return_inverse=True)
+        least = np.full(len(named), np.inf)
+        np.minimum.at(least, which.ravel(), toc)
+        for (a, b), t in zip(named.tolist(), least.tolist(), strict=True):
+            if a != b:
+                first[a, b] = min(t, first.get((a, b), np.inf))
+    return first
+
+
 def errors(true, missed, invented, late):
     off = np.abs(late)
     worst, p99 = (float(off.max()), float(np.percentile(off, 99))) if len(off) else (0.0, 0.0)

@@ -19,7 +19,7 @@ from hpccd_ros.bench.report import text
 
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS, PAGE = ROOT / "test" / "bench" / "results", ROOT / "docs" / "performance.md"
-TRADE = "accuracy-trade-h200-16-cores"  # drawn in docs/figures/trade.png
+TRADE = "accuracy-trade-2-cores"  # drawn in docs/figures/trade.png
 TABLE = re.compile(r"(<!-- (?P<name>[a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 TIERS = ("fast", "balanced", "conservative", "exact")
 STOPS, LEAST = ("median", "p95", "p99", "most"), "least_over_linear"

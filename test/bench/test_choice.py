@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hpccd bench accuracy --choose`: the cheapest setting that keeps bounds."""
 
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from sources import ROOT
 
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.bench import choice
+from hpccd_ros.bench import accuracy, choice
 from hpccd_ros.bench.choice import ASKED, Asked, Outcome, Setting
 
 STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", "--repeat", "1")
@@ -67,6 +68,8 @@ def test_the_front_holds_whom_none_beats_that_asks_for_the_same():
     fast, slow = outcome("fast", 1, misses=1e-3), outcome("exact", 2)
     beaten, other = outcome("balanced", 3, error=1e-14), outcome("exact", 0.1, asked="any")
     assert choice.front([fast, slow, beaten, other]) == [fast, slow, other]
+    coarse = Outcome(Setting("exact", "cpu", "all", 0.1), 0.5, dict.fromkeys(choice.QUANTITIES, 0.0) | {"deviation": 1})
+    assert choice.front([fast, slow, coarse]) == [fast, slow, coarse]
 
 
 def test_outcomes_are_of_the_worst_scene_and_of_settings_that_all_were_tested_with():
@@ -75,7 +78,7 @@ def test_outcomes_are_of_the_worst_scene_and_of_settings_that_all_were_tested_wi
     other = row | {"scene": "b", "missed": 0, "invented": 2, "step_ms": 1.0}
     (found,) = choice.outcomes([row, row | {"step_ms": 99.0}, other, row | {"accuracy": "exact"}])
     assert found.setting == Setting("fast", "cpu") and found.ms == 2.0
-    assert found.values == {"misses": 0.2, "spurious": 0.25, "late": 0.1, "early": 0.2, "error": 0.2}
+    assert found.values == {"misses": 0.2, "spurious": 0.25, "late": 0.1, "early": 0.2, "error": 0.2, "deviation": 0.0}
 
 
 class Found:
@@ -91,7 +94,7 @@ class Found:
 
 
 def test_wrong_results_count_against_what_is_asked():
-    every, first, any_, faces, edges = ASKED
+    every, first, any_, faces, edges, *_ = ASKED
     true = vars(Found([[0, 1], [2, 3]], [0.25, 0.5]))
     true = {key: true[key] for key in ("vf", "vf_toc", "ee", "ee_toc")}
     late, none = Found([[2, 3]], [0.625]), Found([], [])
@@ -108,11 +111,46 @@ def test_wrong_results_count_against_what_is_asked():
         assert (errors.true, errors.missed, errors.invented, errors.latest) == expected
 
 
+class Step:
+    """Three meshes of a triangle each."""
+
+    meshes = [SimpleNamespace(n_vertices=3)] * 3
+
+    def faces(self):
+        return np.arange(9).reshape(3, 3)
+
+
+def test_errors_of_meshes_are_those_of_the_first_contact_of_each_pair():
+    of_meshes, any_ = ASKED[-2:]
+    true = vars(Found([[0, 1], [4, 0], [0, 2]], [0.5, 0.25, 0.75]))  # 0 and 1 from 0.25, 0 and 2 from 0.75
+    true = {key: true[key] for key in ("vf", "vf_toc", "ee", "ee_toc")}
+    exact, none, within = Found([[1, 1], [1, 2]], [0.25, 0.75]), Found([], []), Found([[0, 0]], [0.1])
+    early = Found([[1, 0], [3, 1]], [0.125, 0.5])  # of coarse faces in another order: 0 and 1, 1 and 2
+    for found, faces, expected in (
+        (exact, None, (2, 0, 0, 0.0)),
+        (none, None, (2, 2, 0, 0.0)),
+        (within, None, (2, 2, 0, 0.0)),
+        (early, np.array([[3, 4, 5], [6, 7, 8]]), (2, 1, 1, 0.125)),
+    ):
+        errors = of_meshes.errors(found, true, Step(), faces)
+        assert (errors.true, errors.missed, errors.invented, errors.toc_worst) == expected and errors.latest == 0
+        errors = any_.errors(found, true, Step(), faces)
+        assert (errors.true, errors.missed, errors.invented) == (1, int(expected[1] == 2), 0)
+    intersecting = Found([], [])
+    intersecting.ef = np.array([[0, 1, 1]])
+    assert of_meshes.errors(intersecting, true, Step()).toc_worst == 0.25  # at the start
+
+
 def test_a_setting_is_written_for_python_and_for_the_node(monkeypatch):
     python, node = Setting("balanced", "cpu", "first").as_written().split("; ")
     asked = eval(python, {"hc": SimpleNamespace(Detector=lambda scene, **options: options), "scene": None})
     assert asked == {"accuracy": "balanced", "backend": "cpu", "report": "first"}
     assert node == "hpccd_node --ros-args -p accuracy:=balanced -p backend:=cpu -p report:=first"
+    assert "detail" not in python and Setting("exact", "cpu", "meshes", 0.1).as_written() == (
+        'hc.Detector(scene, accuracy="exact", backend="cpu", detail=0.1); '
+        "hpccd_node --ros-args -p accuracy:=exact -p backend:=cpu "
+        '-p stop_detail:="[NAME:0.1]" for each mesh NAME; all meshes with self_collision false'
+    )
     # An option of several words is a list.
     monkeypatch.setattr(choice, "ASKED", (*ASKED, Asked("some", {"outputs": ("points", "normals")})))
     python, node = Setting("exact", "cpu", "some").as_written().split("; ")
@@ -156,3 +194,39 @@ def test_what_too_few_contacts_cannot_show_is_said_and_the_trade_is_drawn(produc
     assert status == 0 and (tmp_path / "trade.png").read_bytes().startswith(b"\x89PNG")
     (said,) = (note for note in result["notes"] if "true contacts" in note)
     assert "misses<1e-09" in said and "late" not in said
+
+
+def test_coarse_meshes_are_tried_where_a_deviation_is_tolerated(product, tmp_path):
+    pytest.importorskip("fast_simplification")
+    scene = ("cloth-drop", "--size", "0.3", "--steps", "1", "--repeat", "1", "--tiers", "exact")
+    words = ("--ask", "any_meshes", "--choose", "misses<=0, deviation<1", "--picture", str(tmp_path / "trade.png"))
+    status, result, _ = product("accuracy", *scene, *words)
+    assert status == 0 and result["failures"] == []
+    rows = {row["detail"]: row for row in result["rows"]}
+    assert set(rows) == {1.0, 0.3, 0.1, 0.03} and {row["asked"] for row in result["rows"]} == {"any_meshes"}
+    assert rows[1.0]["deviation"] == 0 < rows[0.3]["deviation"] and all(row["missed"] == 0 for row in rows.values())
+    status, result, _ = product("accuracy", *scene, "--detail", "0.1", "--ask", "all")
+    assert status == 0 and {(row["asked"], row["detail"]) for row in result["rows"]} == {
+        ("all", 1.0),
+        ("meshes", 1.0),
+        ("meshes", 0.1),
+    }
+
+
+def test_one_mesh_is_not_asked_which_meshes_touch(product, capsys):
+    status, result, _ = product("accuracy", *STRIP, "--tiers", "exact", "--ask", "all,meshes")
+    assert status == 0 and [row["asked"] for row in result["rows"]] == ["all"]
+    assert product("accuracy", *STRIP, "--ask", "meshes")[0] != 0 and "no scene has two" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["2", "0", "few", "0.1,1"])
+def test_a_detail_is_a_part(text):
+    with pytest.raises(UserError, match="name parts between 0 and 1"):
+        accuracy.details(text)
+
+
+def test_without_the_simplifier_no_detail_is_tried(monkeypatch):
+    monkeypatch.setitem(sys.modules, "fast_simplification", None)
+    with pytest.raises(UserError, match="pip install"):
+        accuracy.details("0.1")
+    assert accuracy.details("") == []
