@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from fuzz import detail as fuzz
 
 import hpccd_core as hc
 from hpccd_core import _core
@@ -424,3 +425,23 @@ def test_ignored_faces_are_ignored_where_the_whole_patch_is():
     assert len(hc.Detector(scene, detail=0.2).detect(start, end))
     scene.ignore_faces("sheet", np.arange(288), "ball")
     assert not len(hc.Detector(scene, detail=0.2).detect(start, end))
+
+
+def test_small_scenes_side_by_side():
+    """A short run of python -m fuzz.detail."""
+    tally = dict.fromkeys(("contacts", "rows", "crossing", "coarse", "faces"), 0)
+    for number in range(12):
+        assert fuzz.batch(np.random.default_rng([45, number]), 50, tally) == []
+    assert tally["contacts"] > 1000 and tally["crossing"] > 0 and tally["coarse"] < 0.8 * tally["faces"]
+
+
+def test_components_keep_to_themselves():
+    """Faces whose component collapsed stay as they are, and no coarse face joins two components."""
+    vertices, faces = hc.shapes.box((1.0, 1.0, 1.0))
+    n = len(vertices)
+    rest = np.concatenate([vertices + [8 * k, 0, 0] for k in range(200)])
+    each = np.concatenate([faces + n * k for k in range(200)]).astype(np.uint32)
+    proposal = hc.detail_levels.propose(each, rest, 0.05)
+    mesh = _core.CoarseMesh(each, proposal.faces, proposal.survivor, rest, _core.DetailThreads(2))
+    assert np.array_equal(mesh.faces.min(axis=1) // n, mesh.faces.max(axis=1) // n)
+    assert set(mesh.held[:, 1].tolist()) == set(range(len(each)))

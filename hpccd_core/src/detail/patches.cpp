@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
@@ -284,6 +285,23 @@ void check(const char* name, std::span<const Face> faces, std::size_t n_vertices
                             " vertices; give those of the same mesh");
 }
 
+// By vertex: the least vertex that faces connect it to.
+std::vector<std::uint32_t> components(std::span<const Face> faces, std::size_t n_vertices) {
+  std::vector<std::uint32_t> parent(n_vertices);
+  std::iota(parent.begin(), parent.end(), 0u);
+  const auto root = [&](std::uint32_t v) {
+    while (parent[v] != v) v = parent[v] = parent[parent[v]];
+    return v;
+  };
+  for (const Face& f : faces)
+    for (const std::uint32_t v : {f[1], f[2]}) {
+      const std::uint32_t a = root(f[0]), b = root(v);
+      parent[std::max(a, b)] = std::min(a, b);
+    }
+  for (std::uint32_t v = 0; v < n_vertices; ++v) parent[v] = root(v);
+  return parent;
+}
+
 // Sorted, each once, and grouped by number below n.
 template <class T, class Key>
 Grouped<T> grouped(std::vector<std::pair<Key, T>>& all, std::size_t n, auto&& number_of) {
@@ -408,11 +426,18 @@ Patches patches_of(std::span<const Face> faces, std::span<const Face> proposed, 
     throw InvalidArgument("survivor, rest: expected one entry for each vertex, positions in double precision");
   if (std::ranges::any_of(survivor, [&](std::uint32_t v) { return v != no_vertex && v >= rest.n; }))
     throw InvalidArgument("survivor: an index is beyond the vertices");
-  std::vector<Face> coarse(proposed.begin(), proposed.end());
+  // A component that collapsed may have been moved to another one.
+  const std::vector<std::uint32_t> component = components(faces, rest.n);
+  std::vector<Face> coarse;
+  for (const Face& f : proposed)
+    if (component[f[0]] == component[f[1]] && component[f[0]] == component[f[2]]) coarse.push_back(f);
+  std::vector<std::uint32_t> near(survivor.begin(), survivor.end());
+  for (std::uint32_t v = 0; v < rest.n; ++v)
+    if (near[v] != no_vertex && component[near[v]] != component[v]) near[v] = no_vertex;
   Pieces all;
   std::vector<std::uint32_t> kept;
   {
-    const Mapping mapping(faces, coarse, survivor, rest, pool);
+    const Mapping mapping(faces, coarse, near, rest, pool);
     constexpr std::size_t grain = 1024;
     std::vector<Pieces> parts((faces.size() + grain - 1) / grain);
     std::vector<std::vector<std::uint32_t>> kept_parts(parts.size());
