@@ -238,6 +238,11 @@ def edges(value: object) -> NDArray[np.uint32]:
     return _indices("edges", value, "E", 2)
 
 
+def index_rows(name: str, value: object, columns: int) -> NDArray[np.uint32]:
+    """(N, columns) integers -> uint32, C-contiguous."""
+    return _indices(name, value, "N", columns)
+
+
 def _indices(name: str, value: object, rows: str, columns: int) -> NDArray[np.uint32]:
     array = _array(name, value)
     if array.size == 0 and array.ndim in (1, 2):

@@ -502,10 +502,10 @@ class Detector(
         """Counts of the last call; empty if it failed.
 
         Candidate pairs, pairs that each filter culled (`vf_rejected_kdop`, `ee_rejected_kdop`: the k-DOP filter, bounds
-        along eight directions beside the axes), contacts, bytes used. `leaf_pairs_ns` (one in 64 is timed) and
-        `kdop_ns` are parts of the stages traverse and elementary, summed over threads. With worlds, counts are sums,
-        `worlds` is their number, and `waiting` the time of threads without a world. `gpu_fallbacks` counts frames that
-        the CPU computed after a failure of the GPU.
+        along eight directions beside the axes), pairs ignored by :meth:`Scene.ignore_within` and alike (`ee_ignored`),
+        contacts, bytes used. `leaf_pairs_ns` (one in 64 is timed) and `kdop_ns` are parts of the stages traverse and
+        elementary, summed over threads. With worlds, counts are sums, `worlds` is their number, and `waiting` the time
+        of threads without a world. `gpu_fallbacks` counts frames that the CPU computed after a failure of the GPU.
         """
         return self._core.stats()
 

@@ -214,6 +214,151 @@ class Scene:
         names = arguments.feature_names(features)
         self._call("set_features", mesh_a, mesh_b, ("vertex_face" in names, "edge_edge" in names))
 
+    def ignore_within(
+        self,
+        mesh: MeshName,
+        *,
+        rings: int | None = None,
+        rest_vertices: ArrayLike | None = None,
+        distance: float | None = None,
+    ) -> None:
+        """Never report contacts between neighbouring features of one mesh.
+
+        For cloth whose separation, or thickness, is larger than its edges: without a filter all neighbours would be in
+        contact for ever. Give `rings`, or `rest_vertices` and `distance`; several calls add up.
+
+        Parameters
+        ----------
+        mesh : str or int
+            Name or number of the mesh.
+        rings : int
+            Two features are ignored if a vertex of one is joined to a vertex of the other by at most this many edges,
+            those of faces and those given as `edges`. 0: features that share a vertex, which are always ignored.
+        rest_vertices : ArrayLike, shape (V, 3)
+            Positions of the mesh at rest, in the unit of the coordinates.
+        distance : float
+            Two features are ignored if their distance at rest is at most this: a vertex and a face, two edges, or, for
+            intersections, an edge and a face. It is decided exactly, on the given numbers.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If an argument has the wrong type or shape, is negative or not finite, or if neither or both of the filters
+            are given.
+
+        Notes
+        -----
+        Ignored pairs count nowhere: not in contacts, proximity and intersections, not in steps and motions, and not in
+        `Detector.distances` within the mesh, which is the smallest distance of the pairs that remain. Doubled vertices
+        are not joined by an edge: see :meth:`Detector.distances` for what is found between them, or use a rest filter
+        with distance 0. Rest filters take one search by :class:`Detector` when it is made.
+
+        Examples
+        --------
+        >>> import hpccd_core as hc
+        >>> vertices, faces = hc.shapes.grid(4, 4)
+        >>> scene = hc.Scene()
+        >>> _ = scene.add_mesh("cloth", faces)
+        >>> len(hc.Detector(scene).proximity(vertices, 0.6).vf)
+        176
+        >>> scene.ignore_within("cloth", rings=1)
+        >>> len(hc.Detector(scene).proximity(vertices, 0.6).vf)
+        0
+        """
+        number = self._number("mesh", mesh)
+        if rings is not None and rest_vertices is None and distance is None:
+            self._repeat("ignore_rings", (number, arguments.whole_number("rings", rings, 0, _MOST)))
+            return
+        if rings is not None or rest_vertices is None or distance is None:
+            raise TypeError("ignore_within: give either rings, or rest_vertices and distance")
+        positions, n = arguments.reals("rest_vertices", rest_vertices), self._n_vertices_of(number)
+        if positions.shape != (n, 3):
+            raise ValueError(
+                f"rest_vertices: expected shape ({n}, 3), the vertices of this mesh alone, got {positions.shape}"
+            )
+        self._repeat("ignore_at_rest", (number, positions.copy(), arguments.length("distance", distance)))
+
+    def ignore_faces(self, mesh: MeshName, faces: ArrayLike, other: MeshName) -> None:
+        """Never report contacts between some faces of a mesh and another mesh, or the mesh itself.
+
+        Parameters
+        ----------
+        mesh : str or int
+            Name or number of the mesh.
+        faces : ArrayLike, shape (K,), integers
+            Numbers of its faces. Their edges and vertices are ignored too, unless they are in a face that is not
+            listed. Several calls add up.
+        other : str or int
+            Name or number of the other mesh. The mesh itself: then against all of its features.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If an argument has the wrong type or shape, or a face is out of range.
+
+        Examples
+        --------
+        >>> import hpccd_core as hc
+        >>> scene = hc.Scene()
+        >>> _ = scene.add_mesh("cloth", hc.shapes.grid(10, 10)[1])
+        >>> _ = scene.add_mesh("robot", [[0, 1, 2]])
+        >>> scene.ignore_faces("cloth", [0, 1], "robot")  # where the robot holds it
+        """
+        pair = self._number("mesh", mesh), self._number("other", other)
+        numbers = arguments.integers("faces", faces)
+        if numbers.size == 0:
+            numbers = np.empty(0, np.uint32)
+        elif numbers.ndim != 1:
+            raise ValueError(f"faces: expected shape (K,), numbers of faces of the mesh, got {numbers.shape}")
+        n = self._n_faces_of(pair[0])
+        if numbers.size and not (0 <= numbers.min() and numbers.max() < n):
+            least, greatest = (arguments.shown(int(end)) for end in (numbers.min(), numbers.max()))
+            raise ValueError(f"faces: numbers of this mesh's faces lie below {n}, got {least} to {greatest}")
+        self._repeat("ignore_faces", (pair[0], numbers.astype(np.uint32), pair[1]))
+
+    def ignore_features(
+        self, vf: ArrayLike = _NOT_GIVEN, ee: ArrayLike = _NOT_GIVEN, ef: ArrayLike = _NOT_GIVEN
+    ) -> None:
+        """Never report single pairs of features. Several calls add up.
+
+        Parameters
+        ----------
+        vf : ArrayLike, shape (N, 2), integers
+            Vertex and face, in scene-wide indices, as rows of ``contacts.vf``.
+        ee : ArrayLike, shape (M, 4), integers
+            The vertices of two edges, in scene-wide indices, as rows of ``contacts.ee``. The order of the edges, and of
+            the vertices of each, does not matter.
+        ef : ArrayLike, shape (K, 3), integers
+            The vertices of an edge, and a face, in scene-wide indices, as rows of ``intersections.ef``.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If an argument has the wrong type or shape, or an index is out of range. :class:`Detector` raises ValueError
+            if the vertices of a row are not joined by an edge.
+
+        Examples
+        --------
+        Ignore everything that is near at the start:
+
+        >>> import hpccd_core as hc
+        >>> vertices, faces = hc.shapes.grid(4, 4)
+        >>> scene = hc.Scene()
+        >>> _ = scene.add_mesh("cloth", faces)
+        >>> near = hc.Detector(scene).proximity(vertices, 0.6)
+        >>> scene.ignore_features(near.vf, near.ee)
+        >>> len(hc.Detector(scene).proximity(vertices, 0.6).ee)
+        0
+        """
+        rows = arguments.index_rows("vf", vf, 2), arguments.index_rows("ee", ee, 4), arguments.index_rows("ef", ef, 3)
+        self._repeat("ignore_features", tuple(array.copy() for array in rows))
+
+    def _n_vertices_of(self, number: int) -> int:
+        return int(np.diff(self.layout.vertex_offsets)[number])
+
+    def _n_faces_of(self, number: int) -> int:
+        return int(np.diff(self.layout.face_offsets)[number])
+
     def _call(self, name: str, mesh_a: MeshName, mesh_b: MeshName, *values: Any) -> None:
         pair = self._number("mesh_a", mesh_a), self._number("mesh_b", mesh_b)
         self._repeat(name, (*pair, *values))

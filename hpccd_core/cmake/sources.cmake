@@ -4,7 +4,7 @@ set(hpccd_sources
   src/base/forks.cpp src/base/parallel.cpp src/base/simd.cpp
   src/base/standard_arithmetic.cpp src/base/thread_affinity.cpp
   src/rigid/c_library.cpp src/rigid/joint_bounds.cpp src/rigid/joint_chain.cpp src/rigid/placed_vertices.cpp
-  src/scene/edges.cpp src/scene/face_adjacency.cpp src/scene/features.cpp src/scene/pair_rules.cpp
+  src/scene/edges.cpp src/scene/face_adjacency.cpp src/scene/feature_filter.cpp src/scene/features.cpp src/scene/pair_rules.cpp
   src/scene/scene.cpp src/scene/separation_table.cpp src/scene/thickness.cpp
   src/scene/static_meshes.cpp src/scene/tested_pairs.cpp
   src/bvh/build.cpp src/bvh/motion_bounds.cpp src/bvh/refit.cpp src/bvh/split.cpp src/bvh/squeezed_axis.cpp
@@ -34,6 +34,6 @@ set(hpccd_sources
   src/hybrid/communication.cpp src/hybrid/engine.cpp src/hybrid/segments.cpp src/hybrid/sink.cpp
   src/backends/available.cpp src/backends/cpu_backend.cpp src/backends/gpu_backend.cpp
   src/backends/gpu_contacts.cpp src/backends/hybrid_backend.cpp src/backends/moving_tree.cpp src/backends/near_list.cpp
-  src/backends/changed_pairs.cpp src/backends/one_by_one.cpp src/backends/planes.cpp src/backends/resources.cpp src/backends/shortening.cpp src/backends/tuner.cpp
+  src/backends/changed_pairs.cpp src/backends/one_by_one.cpp src/backends/planes.cpp src/backends/resources.cpp src/backends/rest_pairs.cpp src/backends/shortening.cpp src/backends/tuner.cpp
   src/backends/work_counts.cpp src/backends/world_by_world.cpp src/backends/worlds_on_cpus.cpp
   src/checked.cpp src/detector.cpp src/errors.cpp src/prepared.cpp src/version.cpp)

@@ -392,6 +392,33 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
             s.set_thickness(mesh, {values.data(), static_cast<std::size_t>(values.size())});
           },
           "mesh"_a, "values"_a)
+      .def(
+          "ignore_rings", [](Scene& s, std::uint32_t mesh, std::uint32_t rings) { s.ignore_within(mesh, rings); },
+          "mesh"_a, "rings"_a)
+      .def(
+          "ignore_at_rest",
+          [](Scene& s, std::uint32_t mesh, const Array<double>& vertices, double distance) {
+            s.ignore_within(mesh, RestFilter{{vertices.data(), vertices.data() + vertices.size()}, distance});
+          },
+          "mesh"_a, "vertices"_a, "distance"_a)
+      .def(
+          "ignore_faces",
+          [](Scene& s, std::uint32_t mesh, const Array<std::uint32_t>& faces, std::uint32_t other) {
+            s.ignore_faces(mesh, {faces.data(), static_cast<std::size_t>(faces.size())}, other);
+          },
+          "mesh"_a, "faces"_a, "other"_a)
+      .def(
+          "ignore_features",
+          [](Scene& s, const Array<std::uint32_t>& vf, const Array<std::uint32_t>& ee, const Array<std::uint32_t>& ef) {
+            const auto rows = []<std::size_t n>(const Array<std::uint32_t>& a, std::integral_constant<std::size_t, n>) {
+              return std::span(reinterpret_cast<const std::array<std::uint32_t, n>*>(a.data()),
+                               static_cast<std::size_t>(a.size()) / n);
+            };
+            s.ignore_features(rows(vf, std::integral_constant<std::size_t, 2>()),
+                              rows(ee, std::integral_constant<std::size_t, 4>()),
+                              rows(ef, std::integral_constant<std::size_t, 3>()));
+          },
+          "vf"_a, "ee"_a, "ef"_a)
       .def_property_readonly("n_vertices", &Scene::n_vertices)
       .def_property_readonly("n_faces", [](const Scene& s) { return s.faces().size(); })
       .def(

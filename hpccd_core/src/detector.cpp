@@ -591,7 +591,8 @@ std::map<std::string, std::uint64_t> Detector::stats() const {
   stats.insert(d.found->begin(), d.found->end());
   stats["triangles"] = d.common.features.n_faces();
   stats["bytes"] += d.engine->shared.tree.bytes() + d.common.features.bytes() + d.common.separations.bytes() +
-                    d.common.thickness.bytes() + d.common.rules.bytes() + d.common.planes.bytes();
+                    d.common.filter.bytes() + d.common.thickness.bytes() + d.common.rules.bytes() +
+                    d.common.planes.bytes();
   if (d.options().worlds > 1) stats["worlds"] = d.options().worlds;
   return stats;
 }

@@ -95,18 +95,23 @@ class HPCCD_API Scene {
   /// Throws InvalidArgument if the number of values is another one, or if a value is negative or not finite.
   void set_thickness(std::uint32_t mesh, std::span<const double> thickness);
 
-  /// Ignores pairs of features of one mesh with vertices that are joined by at most `rings` edges.
+  /// Ignores pairs of features of one mesh with vertices that are joined by at most `rings` edges. 0: pairs that share
+  /// a vertex, which are always ignored. Of several calls the largest number counts.
   void ignore_within(std::uint32_t mesh, std::uint32_t rings);
-  /// Ignores pairs of features of one mesh that are within a distance of each other at rest. Throws InvalidArgument
+  /// Ignores pairs of features of one mesh that are within a distance of each other at rest; repeated calls add to
+  /// them. Each Detector of the scene finds them again, by a search for pairs at tier exact. Throws InvalidArgument
   /// unless `rest` has three finite coordinates per vertex of the mesh and the distance is finite and >= 0.
   void ignore_within(std::uint32_t mesh, RestFilter rest);
-  /// Ignores some faces of a mesh, and edges and vertices that are in no other face, against another mesh. `faces` are
-  /// numbers of faces of the mesh; repeated calls add to them.
+  /// Ignores some faces of a mesh, and those of their edges and vertices that are in no other face, against another
+  /// mesh or plane, or against all of the mesh itself. `faces` are numbers of faces of the mesh; repeated calls add to
+  /// them.
   void ignore_faces(std::uint32_t mesh, std::span<const std::uint32_t> faces, std::uint32_t other);
-  /// Ignores single pairs of features: rows as in Contacts::vf and Contacts::ee, in scene-wide numbers; repeated calls
-  /// add to them.
+  /// Ignores single pairs of features: rows as in Contacts::vf, Contacts::ee and Intersections::ef, in scene-wide
+  /// numbers; the vertices of an edge and the edges of a pair in any order. Repeated calls add to them. A Detector
+  /// throws InvalidArgument if two vertices of a row are no edge.
   void ignore_features(std::span<const std::array<std::uint32_t, 2>> vf,
-                       std::span<const std::array<std::uint32_t, 4>> ee);
+                       std::span<const std::array<std::uint32_t, 4>> ee,
+                       std::span<const std::array<std::uint32_t, 3>> ef = {});
 
   /// Nothing is tested between the two meshes.
   void ignore_pair(std::uint32_t mesh_a, std::uint32_t mesh_b);
@@ -161,10 +166,11 @@ class HPCCD_API Scene {
   std::map<Pair, double> separation_;
   std::map<Pair, TestedFeatures> features_;
   std::map<std::uint32_t, std::uint32_t> rings_;              // by mesh
-  std::map<std::uint32_t, RestFilter> rest_;                  // by mesh
+  std::map<std::uint32_t, std::vector<RestFilter>> rest_;     // by mesh
   std::map<Pair, std::vector<std::uint32_t>> ignored_faces_;  // by mesh and other mesh, in this order
   std::vector<std::array<std::uint32_t, 2>> ignored_vf_;
   std::vector<std::array<std::uint32_t, 4>> ignored_ee_;
+  std::vector<std::array<std::uint32_t, 3>> ignored_ef_;
 };
 
 }  // namespace v0_1

@@ -157,6 +157,7 @@ void CpuBackend::begin(Search& search, const MotionBounds& motion) const {
   search.geometry = {motion.vertices.data(), shared_.features.edges.data(), shared_.features.faces.data(),
                      motion.kdops.data()};
   search.cancellation = &shared_.cancellation;
+  search.filter = &shared_.common.filter.view();
 }
 
 void CpuBackend::traverse() {
@@ -275,8 +276,8 @@ std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
   fit_snapshot(vertices);
   if (!mesh_pairs_) mesh_pairs_.emplace(shared_.rules, shared_.scene->meshes().size());
   if (!containment_) containment_.emplace(*shared_.scene, shared_.features, *mesh_pairs_);
-  NearestPairs nearest(*mesh_pairs_, shared_.features, shared_.tree.motion(), shared_.tree.tree(),
-                       shared_.common.thickness);
+  NearestPairs nearest(*mesh_pairs_, shared_.rules, &shared_.common.filter.view(), shared_.features,
+                       shared_.tree.motion(), shared_.tree.tree(), shared_.common.thickness);
   DistanceSearch search(shared_.tree.tree(), shared_.rules, shared_.options.simd, nearest);
   begin(search);
   search.geometry.separations.thickness = shared_.common.thickness.view();

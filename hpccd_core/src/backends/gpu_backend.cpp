@@ -304,8 +304,9 @@ void GpuBackend::throw_bad_snapshot(Positions vertices) {
 template <class Bound>
 void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
   if (!pipeline_) {
-    pipeline_ = gpu::Pipeline::create(*shared_.scene, shared_.features, shared_.options, shared_.separations,
-                                      shared_.common.thickness, gpu::status().devices.at(0).number);
+    pipeline_ =
+        gpu::Pipeline::create(*shared_.scene, shared_.features, shared_.options, shared_.separations,
+                              shared_.common.thickness, shared_.common.filter, gpu::status().devices.at(0).number);
     shared_.profiler.mark("gpu_start");
   }
   const bool worn = has_tree_ && worn_out_on_device();
@@ -587,8 +588,9 @@ GpuBackend::Prepared GpuBackend::prepare(Positions t0, Positions t1, double room
   Options options = shared_.options;
   options.gpu_stages = false;  // unused, and events would accumulate
   Prepared p;
-  p.pipeline = gpu::Pipeline::create(*shared_.scene, shared_.features, options, shared_.separations,
-                                     shared_.common.thickness, gpu::status().devices.at(0).number);
+  p.pipeline =
+      gpu::Pipeline::create(*shared_.scene, shared_.features, options, shared_.separations, shared_.common.thickness,
+                            shared_.common.filter, gpu::status().devices.at(0).number);
   shared_.tree.bound(on_host(of_world(t0, 0), 0), on_host(of_world(t1, 0), 1), {});
   shared_.tree.build_anew();
   p.pipeline->set_tree(shared_.tree.tree());

@@ -51,10 +51,10 @@ std::optional<Detection> HybridBackend::detect(Positions t0, Positions t1) {
 bool HybridBackend::start() {
   const Options& o = shared_.options;
   try {
-    engine_ =
-        std::make_unique<hybrid::Engine>(hybrid::cuda_devices(*shared_.scene, shared_.features, o.accuracy, o.features,
-                                                              shared_.separations, shared_.common.thickness, o.gpus),
-                                         hybrid::Sizes{o.hybrid_segments, o.hybrid_segment_pairs}, shared_.pool);
+    engine_ = std::make_unique<hybrid::Engine>(
+        hybrid::cuda_devices(*shared_.scene, shared_.features, o.accuracy, o.features, shared_.separations,
+                             shared_.common.thickness, shared_.common.filter, o.gpus),
+        hybrid::Sizes{o.hybrid_segments, o.hybrid_segment_pairs}, shared_.pool);
   } catch (const gpu::Error& e) {
     failures_.failed(e.what());
     return false;

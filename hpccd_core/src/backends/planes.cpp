@@ -73,8 +73,9 @@ std::array<double, 3> row(const V& v) { return {v.x, v.y, v.z}; }
 
 }  // namespace
 
-Planes::Planes(const Scene& scene, const SeparationTable& separations, const ThicknessTable& thickness)
-    : scene_(scene), separations_(separations), thickness_(thickness) {
+Planes::Planes(const Scene& scene, const SeparationTable& separations, const ThicknessTable& thickness,
+               const FeatureFilter& filter)
+    : scene_(scene), separations_(separations), thickness_(thickness), filter_(filter) {
   const auto& meshes = scene.meshes();
   for (std::uint32_t m = 0; m < meshes.size(); ++m) {
     if (!meshes[m].plane) continue;
@@ -139,7 +140,9 @@ void Planes::find(const Query& query, std::size_t begin, std::size_t end, std::v
     if (x0 != x1) any |= mark(h, x1 + 3 * from, n, open);
     for (std::size_t i = from; any && i < from + n; ++i) {
       if (!open[i - from]) continue;
-      const double thickness = thickness_of_vertex(i % scene_.n_vertices());
+      const auto v = static_cast<std::uint32_t>(i % scene_.n_vertices());
+      if (filter_.ignores(v, planes_[plane].mesh)) continue;
+      const double thickness = thickness_of_vertex(v);
       if (thickness_.even(mesh))
         test(i, plane, h, thickness);
       else
@@ -276,6 +279,7 @@ Gap Planes::gap(std::uint32_t plane, std::uint32_t mesh, const Real* vertices) c
   for (std::uint32_t v = m.first_vertex; v < m.first_vertex + m.n_vertices; ++v) {
     const Real* x = vertices + 3 * std::size_t{v};
     if (!(h.least_distance(x[0], x[1], x[2]) - thickest <= gap.distance)) continue;
+    if (filter_.ignores(v, planes_[plane].mesh)) continue;
     const double distance = h.distance({x[0], x[1], x[2]}) - thickness_of_vertex(v);
     if (distance < gap.distance) gap.distance = distance, gap.features = {v, plane}, gap.kind = GapKind::vertex_plane;
   }

@@ -11,6 +11,7 @@
 #include "contacts/outputs.h"
 #include "elementary/half_space.h"
 #include "hpccd/hpccd.h"
+#include "scene/feature_filter.h"
 #include "scene/separation_table.h"
 #include "scene/thickness.h"
 
@@ -18,7 +19,8 @@ namespace hpccd {
 
 class Planes {
  public:
-  Planes(const Scene& scene, const SeparationTable& separations, const ThicknessTable& thickness);
+  Planes(const Scene& scene, const SeparationTable& separations, const ThicknessTable& thickness,
+         const FeatureFilter& filter);
 
   bool any() const { return !planes_.empty(); }
   // Throws InvalidArgument unless it is the number of a plane in the scene, and the value is valid.
@@ -79,6 +81,7 @@ class Planes {
   const Scene& scene_;
   const SeparationTable& separations_;
   const ThicknessTable& thickness_;
+  const FeatureFilter& filter_;
   std::vector<OfScene> planes_;
 };
 

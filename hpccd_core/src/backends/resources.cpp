@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "backends/rest_pairs.h"
 #include "base/simd.h"
 #include "scene/tested_features.h"
 
@@ -17,7 +18,8 @@ Common::Common(std::shared_ptr<const Scene> of, const Options& wanted, int threa
       separations(*scene, wanted.minimum_separation),
       thickness(*scene, features),
       rules(*scene, wanted.accuracy, separations, wanted.features),
-      planes(*scene, separations, thickness),
+      filter(*scene, features, pairs_at_rest(*scene, features, pool.size()), pool),
+      planes(*scene, separations, thickness, filter),
       settled_(separations.version()) {
   require_some("features", wanted.features);
   if (wanted.worlds < 1 || wanted.worlds > Options::most_worlds)

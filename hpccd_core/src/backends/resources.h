@@ -10,6 +10,7 @@
 #include "base/parallel.h"
 #include "base/profiler.h"
 #include "elementary/distance/separations.h"
+#include "scene/feature_filter.h"
 #include "scene/features.h"
 #include "scene/separation_table.h"
 #include "scene/thickness.h"
@@ -30,6 +31,7 @@ struct Common {
   SeparationTable separations;
   ThicknessTable thickness;
   PairRules rules;
+  FeatureFilter filter;
   Planes planes;
 
   // At the beginning of each call: applies separations that were set since the last one.

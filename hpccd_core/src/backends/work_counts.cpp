@@ -16,7 +16,7 @@ void WorkCounts::add(const std::vector<Worker>& workers) {
     leaf_pairs_seconds += w.leaf_pairs_time.seconds();
     const double a_tick = w.elementary_ticks == 0 ? 0 : w.elementary_seconds / static_cast<double>(w.elementary_ticks);
     for (int k = 0; k < 3; ++k) {
-      batches[k] += w.counts[k];
+      batches[k] += w.counts[k], ignored[k] += w.ignored[k];
       add_fallbacks(fallbacks[k], w.fallbacks[k]);
       kdop_seconds += a_tick * static_cast<double>(w.counts[k].kdop_ticks);
     }
@@ -27,7 +27,7 @@ WorkCounts& WorkCounts::operator+=(const WorkCounts& c) {
   node_pairs += c.node_pairs, leaf_pairs += c.leaf_pairs, near_pairs += c.near_pairs;
   leaf_pairs_seconds += c.leaf_pairs_seconds, kdop_seconds += c.kdop_seconds;
   for (int k = 0; k < 3; ++k) {
-    batches[k] += c.batches[k];
+    batches[k] += c.batches[k], ignored[k] += c.ignored[k];
     add_fallbacks(fallbacks[k], c.fallbacks[k]);
     asked[k] = asked[k] || c.asked[k];
   }
@@ -44,6 +44,7 @@ void WorkCounts::write(std::map<std::string, std::uint64_t>& stats) const {
     const std::string kind = kinds[k];
     const BatchCounts& c = batches[k];
     stats[kind + "_candidates"] += c.tested;
+    stats[kind + "_ignored"] += ignored[k];
     stats[kind + "_rejected_coplanarity"] += c.coplanarity;
     stats[kind + "_rejected_projection"] += c.projection;
     stats[kind + "_rejected_roots"] += c.roots;

@@ -15,6 +15,7 @@ struct WorkCounts {
   std::uint64_t node_pairs = 0, leaf_pairs = 0, near_pairs = 0;
   BatchCounts batches[3];  // by kind
   FallbackCounts fallbacks[3];
+  std::uint64_t ignored[3] = {};
   double leaf_pairs_seconds = 0, kdop_seconds = 0;
   // Kinds of pairs that the query tested; whether it searched the earliest contacts; whether it was timed by stage.
   bool asked[3] = {}, earliest = false, timed = false;

@@ -9,6 +9,7 @@
 #include "elementary/distance/separation_test.h"
 #include "elementary/filtered_test.h"
 #include "gpu/candidate_space.cuh"
+#include "gpu/pair_lists.cuh"
 
 namespace hpccd::gpu {
 
@@ -16,6 +17,7 @@ namespace hpccd::gpu {
 struct CandidateState {
   u32 n = 0, n_survivors[2] = {0, 0};
   u32 tested[2] = {0, 0};
+  u32 ignored[2] = {0, 0};  // of this lane
 };
 
 template <class T>
@@ -100,6 +102,18 @@ struct LanePair {
   uint2 features;
 };
 
+// Drops a pair that a filter ignores. Intersections: an edge and a face.
+template <Query query, class T>
+__device__ __forceinline__ void drop_ignored(const LaunchParams<T>& params, CandidateState& state, LanePair& pair,
+                                             u32 world) {
+  if (!pair.wanted) return;
+  const bool edges = pair.features.y & kind_bit;
+  const uint2 features{pair.features.x, pair.features.y & ~kind_bit};
+  if (!is_ignored<query == Query::intersections>(params, features, edges, world)) return;
+  pair.wanted = false;
+  ++(edges ? state.ignored[1] : state.ignored[0]);
+}
+
 // i / n for i < 1024 and n <= 32: exact, since the error i (magic n - 65536) / (65536 n) stays below 1 / n.
 __device__ inline u32 magic_of(u32 n) { return (65536 + n - 1) / n; }
 
@@ -171,7 +185,7 @@ __device__ __forceinline__ uint2 stage_phase(const LaunchParams<T>& params, Cand
 
 // The filter occurs once, in the innermost loop: as a function it costs 30 million register spills on n-body,
 // duplicated it overflows the instruction cache.
-template <Query query, class T>
+template <Query query, bool filtered, class T>
 __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& params, CandidateSpace& s,
                                                      CandidateState& state, uint2 pair) {
   constexpr bool edges_and_faces = query == Query::intersections;
@@ -183,6 +197,8 @@ __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& para
     if (!(tested & tests_edge_edge)) phase = 1;
     if (!(tested & tests_vertex_face)) end = 1;
   }
+  bool drops = false;
+  if constexpr (filtered) drops = are_filtered(params, params.leaves[own], params.leaves[pair.y]);
 #pragma unroll 1
   for (; phase < end; ++phase) {
     const uint2 n = stage_phase<query>(params, s, pair, phase);
@@ -197,6 +213,8 @@ __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& para
       else
         pushed = phase == 0 ? edge_pair<query>(s, world * params.n_edges, i, j, same, c < total)
                             : vertex_face_pair<query>(s, i, j, c < total);
+      if constexpr (filtered)
+        if (drops) drop_ignored<query>(params, state, pushed, world);
       const u32 mask = __ballot_sync(all_lanes, pushed.wanted);
       const u32 at = state.n + __popc(mask & ((1u << lane_number()) - 1));
       if (pushed.wanted) {
@@ -211,7 +229,7 @@ __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& para
 }
 
 // Tests the remaining candidates after the last pair of leaves.
-template <Query query, class Policy, class T>
+template <Query query, class Policy, bool filtered, class T>
 __device__ __forceinline__ void finish_candidates(const LaunchParams<T>& params, CandidateQueue& s,
                                                   CandidateState& state) {
   if (state.n > 0) filter_candidates<query, Policy>(params, s, state);
@@ -220,6 +238,8 @@ __device__ __forceinline__ void finish_candidates(const LaunchParams<T>& params,
   if (lane_number() == 0)
     for (u32 kind = 0; kind < 2; ++kind)
       atomicAdd(&params.counters->candidates[kind], static_cast<u64>(state.tested[kind]));
+  if constexpr (filtered)
+    for (u32 kind = 0; kind < 2; ++kind) add_up(&params.counters->ignored[kind], state.ignored[kind]);
 }
 
 // Takes a few pairs of leaves at a time, until this segment has no more.
@@ -239,7 +259,7 @@ __device__ __forceinline__ void for_leaf_pairs(const LaunchParams<T>& params, Fu
   }
 }
 
-template <Query query, class T>
+template <Query query, bool filtered, class T>
 __global__ __launch_bounds__(32 * candidate_warps,
                              5) void candidates_kernel(const __grid_constant__ LaunchParams<T> params) {
   __shared__ CandidateSpace spaces[candidate_warps];
@@ -247,9 +267,10 @@ __global__ __launch_bounds__(32 * candidate_warps,
   CandidateState state;
   for_leaf_pairs(params, [&](u64 begin, u64 end) {
 #pragma unroll 1
-    for (u64 k = begin; k < end; ++k) leaf_pair_candidates<query>(params, s, state, params.leaf_pairs.pairs[k]);
+    for (u64 k = begin; k < end; ++k)
+      leaf_pair_candidates<query, filtered>(params, s, state, params.leaf_pairs.pairs[k]);
   });
-  finish_candidates<query, Proven>(params, s, state);
+  finish_candidates<query, Proven, filtered>(params, s, state);
 }
 
 }  // namespace hpccd::gpu

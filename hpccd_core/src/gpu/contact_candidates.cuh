@@ -52,7 +52,7 @@ struct LeavesOfPair {
   DeviceLeaf first, second;
 };
 
-template <class Policy, class T>
+template <class Policy, bool filtered, class T>
 __device__ __forceinline__ void contact_candidates(const LaunchParams<T>& params, StagedLeaves& s,
                                                    CandidateState& state, const LeavesOfPair& leaves) {
   const u32 world = world_of_leaves(params, leaves.numbers);
@@ -74,6 +74,8 @@ __device__ __forceinline__ void contact_candidates(const LaunchParams<T>& params
                                       {StagedLeaves::faces_at(0), n.vertices[1], same ? 0 : n.faces[0]}};
   const u32 n_edges = edge_edge.count(), until_other = n_edges + vertex_face[0].count(),
             total = until_other + vertex_face[1].count();
+  bool drops = false;
+  if constexpr (filtered) drops = are_filtered(params, leaves.first, leaves.second);
 #pragma unroll 1
   for (u32 base = 0; base < total; base += 32) {
     const u32 c = base + lane_number();
@@ -82,6 +84,8 @@ __device__ __forceinline__ void contact_candidates(const LaunchParams<T>& params
     const u32 begin = edges ? 0 : other ? until_other : n_edges;
     LanePair pushed{false, {0, 0, 0, 0}, {0, 0}};
     if (c < total) pushed = staged_pair(s, of, other, world * params.n_edges, c - begin, edges, same);
+    if constexpr (filtered)
+      if (drops) drop_ignored<Query::contacts>(params, state, pushed, world);
     const u32 mask = __ballot_sync(all_lanes, pushed.wanted);
     if (pushed.wanted) {
       const u32 at = state.n + __popc(mask & ((1u << lane_number()) - 1));
@@ -100,7 +104,7 @@ __device__ bool is_for(const LaunchParams<T>& params, u32 world) {
   return !params.fast || (params.worlds[world].floats_suffice != 0) == std::is_same_v<Policy, Likely>;
 }
 
-template <class Policy, class T>
+template <class Policy, bool filtered, class T>
 __global__ __launch_bounds__(32 * candidate_warps,
                              6) void contact_candidates_kernel(const __grid_constant__ LaunchParams<T> params) {
   __shared__ StagedLeaves spaces[candidate_warps];
@@ -118,10 +122,10 @@ __global__ __launch_bounds__(32 * candidate_warps,
 #pragma unroll 1
     for (; near; near &= near - 1) {
       const u32 k = __ffs(near) - 1;
-      contact_candidates<Policy>(params, s, state, {ahead.pair(k), ahead.first(k), ahead.second(k)});
+      contact_candidates<Policy, filtered>(params, s, state, {ahead.pair(k), ahead.first(k), ahead.second(k)});
     }
   });
-  finish_candidates<Query::contacts, Policy>(params, s, state);
+  finish_candidates<Query::contacts, Policy, filtered>(params, s, state);
 }
 
 }  // namespace hpccd::gpu

@@ -34,6 +34,7 @@ struct Counters {
   u64 survivors[2], single[2], many[2], separated[2];                                        // of the current segment
   u64 all_survivors[2], all_single[2], all_many[2], most_survivors, most_single, most_many;  // of all segments
   u64 most_separated;
+  u64 ignored[2];  // candidates dropped by filters
   u64 candidates[2], proven[2], undecided_of[2];
   u64 open[2];    // of the current segment: pairs that single precision leaves undecided
   u64 missed[2];  // apart at their only root in single precision: on none of the following lists

@@ -9,6 +9,7 @@
 #include "gpu/device.h"
 #include "gpu/launch_params.cuh"
 #include "gpu/stream.h"
+#include "scene/feature_filter.h"
 #include "scene/features.h"
 #include "scene/scene_pairs.h"
 #include "scene/separation_table.h"
@@ -21,7 +22,8 @@ class DeviceScene {
  public:
   // On the current device. Throws Error if the scene has too many features for 31-bit numbers.
   DeviceScene(const Scene& scene, const Features& features, Accuracy accuracy, TestedFeatures tested,
-              const SeparationTable& separations, const ThicknessTable& thickness, u32 n_worlds)
+              const SeparationTable& separations, const ThicknessTable& thickness, const FeatureFilter& filter,
+              u32 n_worlds)
       : features_(features), separations_(separations), thickness_(thickness), n_worlds_(n_worlds) {
     const auto n_edges = features.edges.size();
     if (std::max<std::size_t>({features.n_vertices, n_edges, features.n_faces()}) * n_worlds >= kind_bit)
@@ -31,6 +33,7 @@ class DeviceScene {
     upload(mesh_of_vertex_, features.mesh_of_vertex.data(), features.mesh_of_vertex.size());
     upload_rules(scene, accuracy);
     upload_tested(scene, tested);
+    upload_filter(scene, filter);
     keys_ = PairKeys::of(features.n_vertices, n_edges, features.n_faces(), n_worlds);
   }
 
@@ -49,6 +52,23 @@ class DeviceScene {
     params.default_accuracy = default_accuracy_;
     params.features = one_tested_ ? nullptr : tested_.data();
     params.default_features = default_tested_;
+    params.filtered = filtered_.size() ? filtered_.data() : nullptr;
+    if (params.filtered) {
+      const auto rows = [&](std::size_t table) {
+        return first_[table].size() ? RowsView{first_[table].data(), values_[table].data()} : RowsView{};
+      };
+      using F = FeatureFilter;
+      params.filter = {reinterpret_cast<const u32*>(params.edges),
+                       params.faces,
+                       params.mesh_of_vertex,
+                       rows(F::near),
+                       rows(F::vf),
+                       rows(F::ee),
+                       rows(F::ef),
+                       rows(F::vertex_against),
+                       rows(F::edge_against),
+                       rows(F::face_against)};
+    }
     params.keys = keys_;
   }
 
@@ -89,9 +109,11 @@ class DeviceScene {
 
   const PairKeys& keys() const { return keys_; }
   std::size_t bytes() const {
-    return edges_.bytes() + faces_.bytes() + mesh_of_vertex_.bytes() + enabled_.bytes() + accuracy_.bytes() +
-           tested_.bytes() + pair_separation_.bytes() + largest_separation_.bytes() + vertex_thickness_.bytes() +
-           edge_thickness_.bytes() + face_thickness_.bytes();
+    std::size_t of_filter = filtered_.bytes();
+    for (std::size_t i = 0; i < FeatureFilter::n_tables; ++i) of_filter += first_[i].bytes() + values_[i].bytes();
+    return of_filter + edges_.bytes() + faces_.bytes() + mesh_of_vertex_.bytes() + enabled_.bytes() +
+           accuracy_.bytes() + tested_.bytes() + pair_separation_.bytes() + largest_separation_.bytes() +
+           vertex_thickness_.bytes() + edge_thickness_.bytes() + face_thickness_.bytes();
   }
 
  private:
@@ -150,6 +172,19 @@ class DeviceScene {
                                 [&](u32 a, u32 b) { return bits(scene.pair_features(a, b, otherwise)); }));
   }
 
+  void upload_filter(const Scene& scene, const FeatureFilter& filter) {
+    if (!filter.any()) return;
+    std::vector<unsigned char> filtered(std::size_t{n_meshes_} * n_meshes_, false);
+    for (const auto& [a, b] : filtered_pairs(scene))
+      filtered[std::size_t{a} * n_meshes_ + b] = filtered[std::size_t{b} * n_meshes_ + a] = true;
+    upload_pairs(filtered_, filtered);
+    for (std::size_t i = 0; i < FeatureFilter::n_tables; ++i) {
+      const FeatureFilter::Rows& rows = filter.rows()[i];
+      upload(first_[i], rows.first.data(), rows.first.size());
+      upload(values_[i], rows.values.data(), rows.values.size());
+    }
+  }
+
   const Features& features_;
   const SeparationTable& separations_;
   const ThicknessTable& thickness_;
@@ -161,6 +196,8 @@ class DeviceScene {
   DeviceBuffer<uint2> edges_;
   DeviceBuffer<u32> faces_, mesh_of_vertex_;
   DeviceBuffer<unsigned char> enabled_, accuracy_, tested_;
+  DeviceBuffer<unsigned char> filtered_;
+  DeviceBuffer<u32> first_[FeatureFilter::n_tables], values_[FeatureFilter::n_tables];
   DeviceBuffer<double> pair_separation_, largest_separation_;
   DeviceBuffer<double> vertex_thickness_, edge_thickness_, face_thickness_;
   bool all_enabled_ = true, one_accuracy_ = true, all_fast_ = true, one_tested_ = true;

@@ -7,7 +7,9 @@ namespace hpccd::gpu {
 
 template <class T>
 void launch_likely(const LaunchParams<T>& params, const Stages& stages) {
-  stages.persistent(contact_candidates_kernel<Likely, T>, 32 * candidate_warps, params, "contact_candidates_kernel");
+  stages.persistent(
+      params.filtered ? contact_candidates_kernel<Likely, true, T> : contact_candidates_kernel<Likely, false, T>,
+      32 * candidate_warps, params, "contact_candidates_kernel");
   stages.mark("candidates");
   stages.persistent(sort_survivors_kernel<Likely, T>, 128, params, "sort_survivors_kernel", 2);
   stages.mark("sort_survivors");

@@ -42,6 +42,7 @@ __device__ inline uint2 two_of_one_leaf(uint2 c, u32 width) {
 // Candidates that wait in shared memory for a place in the lists, and their total number.
 struct NearState {
   u32 n = 0, tested[2] = {0, 0};
+  u32 ignored[2] = {0, 0};  // by filters, of this lane
 };
 
 template <class T>
@@ -85,9 +86,12 @@ __device__ __forceinline__ bool is_near(const NearLeaves& s, u32 first, u32 seco
   return apart && overlap(s.first.box(first), s.second.box(second));
 }
 
-template <class T>
+// drops: a filter may ignore pairs.
+template <bool filtered, class T>
 __device__ __forceinline__ void keep_near_pairs(const LaunchParams<T>& params, NearLeaves& s, NearState& state,
-                                                const NearCounts& a, const NearCounts& b, u32 first_edge, bool same) {
+                                                const NearCounts& a, const NearCounts& b, u32 world, bool same,
+                                                bool drops) {
+  const u32 first_edge = world * params.n_edges;
   const NearProduct edge_edge = same ? edges_of_one_leaf(a.edges) : NearProduct::of(0, a.edges, 0, b.edges);
   const NearProduct vertex_face = NearProduct::of(a.edges + a.faces, a.vertices, b.edges, b.faces);
   const NearProduct face_vertex = NearProduct::of(a.edges, same ? 0 : a.faces, b.edges + b.faces, b.vertices);
@@ -105,6 +109,11 @@ __device__ __forceinline__ void keep_near_pairs(const LaunchParams<T>& params, N
     }
     uint2 features{0, 0};
     if (near) near = is_near(s, s.near[of.first + pair.x], of.second + pair.y, first_edge, edges, face_first, features);
+    if constexpr (filtered)
+      if (drops && near && is_ignored<false>(params, {features.x, features.y & ~kind_bit}, edges, world)) {
+        near = false;
+        ++(edges ? state.ignored[1] : state.ignored[0]);
+      }
     const u32 mask = __ballot_sync(all_lanes, near);
     if (near) s.waiting[state.n + __popc(mask & ((1u << lane_number()) - 1))] = features;
     state.n += __popc(mask);
@@ -152,7 +161,7 @@ __device__ __forceinline__ NearCounts near_of_first(const LaunchParams<T>& param
 }
 
 // second: numbered in its world.
-template <class T>
+template <bool filtered, class T>
 __device__ __forceinline__ void near_candidates(const LaunchParams<T>& params, NearLeaves& s, NearState& state,
                                                 const FirstLeaf& first, u32 second, const DeviceLeaf& second_leaf) {
   const u32 y = first.world * params.n_leaves + second, tested = tested_features(params, first.leaf, second_leaf);
@@ -178,11 +187,13 @@ __device__ __forceinline__ void near_candidates(const LaunchParams<T>& params, N
     if (near) s.second.put(at, box, numbers);
   }
   __syncwarp();
-  keep_near_pairs(params, s, state, a, b, first.world * params.n_edges, first.number == y);
+  bool drops = false;
+  if constexpr (filtered) drops = are_filtered(params, first.leaf, second_leaf);
+  keep_near_pairs<filtered>(params, s, state, a, b, first.world, first.number == y, drops);
   __syncwarp();
 }
 
-template <class T>
+template <bool filtered, class T>
 __global__ __launch_bounds__(32 * candidate_warps,
                              6) void near_candidates_kernel(const __grid_constant__ LaunchParams<T> params) {
   __shared__ NearLeaves spaces[candidate_warps];
@@ -199,12 +210,14 @@ __global__ __launch_bounds__(32 * candidate_warps,
         first = {pair.x, world_of_leaves(params, pair), ahead.first(k)};
         stage_first(params, s, first);
       }
-      near_candidates(params, s, state, first, pair.y, ahead.second(k));
+      near_candidates<filtered>(params, s, state, first, pair.y, ahead.second(k));
     }
   });
   if (state.n > 0) flush_candidates(params, s, state);
   if (lane_number() == 0)
     for (u32 k = 0; k < 2; ++k) atomicAdd(&params.counters->candidates[k], static_cast<u64>(state.tested[k]));
+  if constexpr (filtered)
+    for (u32 k = 0; k < 2; ++k) add_up(&params.counters->ignored[k], state.ignored[k]);
 }
 
 }  // namespace hpccd::gpu

@@ -29,12 +29,13 @@ double as_time(u64 soonest) { return soonest ? std::bit_cast<double>(~soonest) :
 class DevicePipeline : public Pipeline {
  public:
   DevicePipeline(const Scene& scene, const Features& features, const Options& options,
-                 const SeparationTable& separations, const ThicknessTable& thickness, int device)
+                 const SeparationTable& separations, const ThicknessTable& thickness, const FeatureFilter& filter,
+                 int device)
       : device_((check(cudaSetDevice(device), "cudaSetDevice"), device)),
         options_(options),
         timer_(options.gpu_stages),
         features_(features),
-        scene_(scene, features, options.accuracy, options.features, separations, thickness, options.worlds),
+        scene_(scene, features, options.accuracy, options.features, separations, thickness, filter, options.worlds),
         tree_(options.worlds),
         positions_(device),
         lists_(16 * typical_size(), 4 * typical_size(), typical_size() / 2),
@@ -581,6 +582,7 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
     const std::string kind = kinds[k];
     const BatchCounts b = batch_counts(c, k);
     s[kind + "_candidates"] = b.tested;
+    s[kind + "_ignored"] = c.ignored[k];
     s[kind + "_rejected_coplanarity"] = b.coplanarity;
     s[kind + "_rejected_projection"] = b.projection;
     s[kind + "_rejected_roots"] = b.roots;
@@ -609,9 +611,9 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
 
 std::unique_ptr<Pipeline> Pipeline::create(const Scene& scene, const Features& features, const Options& options,
                                            const SeparationTable& separations, const ThicknessTable& thickness,
-                                           int device) {
+                                           const FeatureFilter& filter, int device) {
   if (status().devices.empty()) throw Error(status().reason);
-  return std::make_unique<DevicePipeline>(scene, features, options, separations, thickness, device);
+  return std::make_unique<DevicePipeline>(scene, features, options, separations, thickness, filter, device);
 }
 
 }  // namespace hpccd::gpu

@@ -20,6 +20,7 @@
 #include "gpu/query.h"
 #include "hpccd/hpccd.h"
 #include "hpccd/prepared.h"
+#include "scene/feature_filter.h"
 #include "scene/features.h"
 #include "scene/separation_table.h"
 #include "scene/thickness.h"
@@ -68,7 +69,7 @@ class Pipeline {
   // Separations may change between frames.
   static std::unique_ptr<Pipeline> create(const Scene& scene, const Features& features, const Options& options,
                                           const SeparationTable& separations, const ThicknessTable& thickness,
-                                          int device);
+                                          const FeatureFilter& filter, int device);
   virtual ~Pipeline() = default;
 
   // Sets the tree whose boxes are refitted in every frame.

@@ -66,7 +66,9 @@ __global__ __launch_bounds__(128) void separation_kernel(const __grid_constant__
 
 template <class T>
 void launch_separation_candidates(const LaunchParams<T>& params, const Stages& stages) {
-  stages.persistent(candidates_kernel<Query::separations, T>, 32 * candidate_warps, params, "candidates_kernel");
+  stages.persistent(params.filtered ? candidates_kernel<Query::separations, true, T>
+                                    : candidates_kernel<Query::separations, false, T>,
+                    32 * candidate_warps, params, "candidates_kernel");
   stages.mark("candidates");
 }
 

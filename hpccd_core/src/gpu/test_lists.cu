@@ -33,7 +33,9 @@ void launch_root_tests(const LaunchParams<T>& params, const Stages& stages) {
 
 template <class T>
 void launch_contact_candidates(const LaunchParams<T>& params, const Stages& stages) {
-  stages.persistent(contact_candidates_kernel<Sieve, T>, 32 * candidate_warps, params, "contact_candidates_kernel");
+  stages.persistent(
+      params.filtered ? contact_candidates_kernel<Sieve, true, T> : contact_candidates_kernel<Sieve, false, T>,
+      32 * candidate_warps, params, "contact_candidates_kernel");
   stages.mark("candidates");
 }
 

@@ -25,7 +25,7 @@ void fail_after(int) {}
 void download(const void*, void*, std::size_t) { throw Error(status().reason); }
 
 std::unique_ptr<Pipeline> Pipeline::create(const Scene&, const Features&, const Options&, const SeparationTable&,
-                                           const ThicknessTable&, int) {
+                                           const ThicknessTable&, const FeatureFilter&, int) {
   throw Error(status().reason);
 }
 

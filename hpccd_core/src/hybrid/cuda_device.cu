@@ -14,10 +14,11 @@ namespace {
 class CudaTestDevice final : public TestDevice {
  public:
   CudaTestDevice(const Scene& scene, const Features& features, Accuracy accuracy, TestedFeatures tested,
-                 const SeparationTable& separations, const ThicknessTable& thickness, int device)
+                 const SeparationTable& separations, const ThicknessTable& thickness, const FeatureFilter& filter,
+                 int device)
       : device_((check(cudaSetDevice(device), "cudaSetDevice"), device)),
         features_(features),
-        scene_(scene, features, accuracy, tested, separations, thickness, 1),
+        scene_(scene, features, accuracy, tested, separations, thickness, filter, 1),
         leaves_(1),
         slots_(n_slots) {
     check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device), "cudaDeviceGetAttribute");
@@ -172,14 +173,15 @@ class CudaTestDevice final : public TestDevice {
 
 std::vector<std::unique_ptr<TestDevice>> cuda_devices(const Scene& scene, const Features& features, Accuracy accuracy,
                                                       TestedFeatures tested, const SeparationTable& separations,
-                                                      const ThicknessTable& thickness, int gpus) {
+                                                      const ThicknessTable& thickness, const FeatureFilter& filter,
+                                                      int gpus) {
   const auto& devices = status().devices;
   if (devices.empty()) throw Error(status().reason);
   const std::size_t n = gpus > 0 ? static_cast<std::size_t>(gpus) : devices.size();
   std::vector<std::unique_ptr<TestDevice>> found;
   for (std::size_t i = 0; i < std::min(n, devices.size()); ++i)
-    found.push_back(
-        std::make_unique<CudaTestDevice>(scene, features, accuracy, tested, separations, thickness, devices[i].number));
+    found.push_back(std::make_unique<CudaTestDevice>(scene, features, accuracy, tested, separations, thickness, filter,
+                                                     devices[i].number));
   return found;
 }
 

@@ -126,7 +126,7 @@ class Slot {
       list.push_back({p.first, p.second, tocs_.data()[i]});
     }
     for (u64 i = 0; i < c.to_host; ++i) output.undecided.push_back(scene.keys().pair_of(lists_.to_host()[i]));
-    for (int k = 0; k < 2; ++k) output.counts[k] += batch_counts(c, k);
+    for (int k = 0; k < 2; ++k) output.counts[k] += batch_counts(c, k), output.ignored[k] += c.ignored[k];
   }
 
   // Waits for all running work, whether or not it succeeds.

@@ -86,7 +86,7 @@ void Engine::merge(std::vector<Worker>& workers) {
         workers[thread].report(Kind::edge_edge, output.edge_edge[i - n_vf]);
   });
   exact_on_cpu_ = output.undecided.size();
-  for (int k = 0; k < 2; ++k) workers[0].counts[k] += output.counts[k];
+  for (int k = 0; k < 2; ++k) workers[0].counts[k] += output.counts[k], workers[0].ignored[k] += output.ignored[k];
 }
 
 void Engine::reset() {

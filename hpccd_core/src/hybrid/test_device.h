@@ -29,6 +29,7 @@ struct Output {
   std::vector<Contact> vertex_face, edge_edge;
   std::vector<Candidate> undecided;  // pairs that only exact arithmetic on the CPU decides
   BatchCounts counts[2];             // vertex-face, edge-edge
+  std::uint64_t ignored[2] = {};     // candidates dropped by filters
 };
 
 // Index pairs that are contiguous in memory.

@@ -6,7 +6,8 @@
 namespace hpccd::hybrid {
 
 std::vector<std::unique_ptr<TestDevice>> cuda_devices(const Scene&, const Features&, Accuracy, TestedFeatures,
-                                                      const SeparationTable&, const ThicknessTable&, int) {
+                                                      const SeparationTable&, const ThicknessTable&,
+                                                      const FeatureFilter&, int) {
   throw gpu::Error(gpu::status().reason);
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/pair_rules.h"
 
+#include "scene/feature_filter.h"
+
 namespace hpccd {
 namespace {
 
@@ -24,6 +26,11 @@ PairRules::PairRules(const Scene& scene, Accuracy accuracy, const SeparationTabl
   };
   set_all(given.accuracy(), [](Rule& rule, const auto&, Accuracy value) { rule.accuracy = value; });
   set_all(given.features(), [](Rule& rule, const auto&, TestedFeatures value) { rule.features = value; });
+  for (const auto& [a, b] : filtered_pairs(scene)) {
+    Rule rule = rules_.of(a, b);
+    rule.filtered = true;
+    set(a, b, rule);
+  }
   separations.for_pairs([&](std::uint32_t a, std::uint32_t b, double separation) { separate(a, b, separation); });
   look_at_all();
 }

@@ -21,6 +21,7 @@ struct Rule {
   Accuracy accuracy;
   bool separated;  // for a minimum separation above 0, or features that may have a thickness
   TestedFeatures features = {};
+  bool filtered = false;  // some pairs of features are ignored (scene/feature_filter.h)
 
   // Number of the test; independent of which candidates exist.
   unsigned number() const { return static_cast<unsigned>(accuracy) + (separated ? 4 : 0); }
@@ -29,7 +30,9 @@ struct Rule {
   bool operator<(const Rule& other) const { return key() < other.key(); }
 
  private:
-  unsigned key() const { return number() + (features.vertex_face ? 8 : 0) + (features.edge_edge ? 16 : 0); }
+  unsigned key() const {
+    return number() + (features.vertex_face ? 8 : 0) + (features.edge_edge ? 16 : 0) + (filtered ? 32 : 0);
+  }
 };
 inline constexpr unsigned n_rules = 8;
 

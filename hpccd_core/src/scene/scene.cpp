@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
+#include "base/coordinate_limits.h"
 #include "base/length.h"
 #include "base/names.h"
 #include "base/standard_arithmetic.h"
@@ -123,6 +126,63 @@ void Scene::set_features(std::uint32_t mesh_a, std::uint32_t mesh_b, TestedFeatu
   const Pair pair = known(mesh_a, mesh_b);
   require_some("features", features);
   features_[pair] = features;
+}
+
+void Scene::ignore_within(std::uint32_t mesh, std::uint32_t rings) {
+  std::uint32_t& most = rings_[known(mesh, mesh).first];
+  most = std::max(most, rings);
+}
+
+void Scene::ignore_within(std::uint32_t mesh, RestFilter rest) {
+  const StandardArithmetic arithmetic;
+  const Mesh& m = meshes_[known(mesh, mesh).first];
+  if (rest.vertices.size() != 3 * std::size_t{m.n_vertices})
+    throw InvalidArgument("rest_vertices: mesh '" + m.name + "' has " + std::to_string(m.n_vertices) +
+                          " vertices, but " + std::to_string(rest.vertices.size()) +
+                          " coordinates were given; give three for each of its vertices");
+  for (std::size_t i = 0; i < rest.vertices.size(); ++i)
+    if (!(std::fabs(rest.vertices[i]) <= largest_in_snapshot))
+      throw InvalidArgument(
+          "rest_vertices[" + std::to_string(i / 3) +
+          "]: has a coordinate that is not finite or beyond 1e300; give positions of the mesh at rest");
+  check_length("distance", rest.distance);
+  rest_[mesh].push_back(std::move(rest));
+}
+
+void Scene::ignore_faces(std::uint32_t mesh, std::span<const std::uint32_t> faces, std::uint32_t other) {
+  known(mesh, other);
+  for (std::size_t i = 0; i < faces.size(); ++i)
+    if (faces[i] >= meshes_[mesh].n_faces)
+      throw InvalidArgument("faces[" + std::to_string(i) + "] is " + std::to_string(faces[i]) + ", but mesh '" +
+                            meshes_[mesh].name + "' has " + std::to_string(meshes_[mesh].n_faces) +
+                            " faces; give numbers of this mesh's own faces, from 0");
+  auto& all = ignored_faces_[{mesh, other}];
+  all.insert(all.end(), faces.begin(), faces.end());
+}
+
+void Scene::ignore_features(std::span<const std::array<std::uint32_t, 2>> vf,
+                            std::span<const std::array<std::uint32_t, 4>> ee,
+                            std::span<const std::array<std::uint32_t, 3>> ef) {
+  const auto check = [&](const char* name, const auto& rows, std::size_t n_vertices_of_row) {
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      for (std::size_t k = 0; k < rows[i].size(); ++k) {
+        const bool vertex = k < n_vertices_of_row;
+        if (rows[i][k] < (vertex ? n_vertices_ : faces_.size())) continue;
+        throw InvalidArgument(
+            std::string(name) + "[" + std::to_string(i) + ", " + std::to_string(k) + "] is " +
+            std::to_string(rows[i][k]) + ", but the scene has " +
+            (vertex ? std::to_string(n_vertices_) + " vertices" : std::to_string(faces_.size()) + " faces") +
+            "; give scene-wide numbers, as in contacts");
+      }
+  };
+  check("vf", vf, 1), check("ee", ee, 4), check("ef", ef, 2);
+  // All or nothing.
+  ignored_vf_.reserve(ignored_vf_.size() + vf.size());
+  ignored_ee_.reserve(ignored_ee_.size() + ee.size());
+  ignored_ef_.reserve(ignored_ef_.size() + ef.size());
+  ignored_vf_.insert(ignored_vf_.end(), vf.begin(), vf.end());
+  ignored_ee_.insert(ignored_ee_.end(), ee.begin(), ee.end());
+  ignored_ef_.insert(ignored_ef_.end(), ef.begin(), ef.end());
 }
 
 bool Scene::pair_enabled(std::uint32_t a, std::uint32_t b) const {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "traverse/near_corners.h"
 
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -45,14 +46,35 @@ struct LeafCorners {
   }
 };
 
-// Every vertex is tested against every face of another mesh, edges against edges.
+// Calls f(number) for each bit that is set.
+template <class Function>
+bool any_of(std::uint32_t bits, Function&& f) {
+  for (; bits; bits &= bits - 1)
+    if (f(static_cast<std::uint32_t>(std::countr_zero(bits)))) return true;
+  return false;
+}
+
+// Every vertex is tested against every face of another mesh, edges against edges, unless a filter ignores them.
 template <class Real>
-bool are_tested(const LeafCorners<Real>& a, std::uint32_t i, const LeafCorners<Real>& b, std::uint32_t j) {
-  return a.features.faces_at[i] || b.features.faces_at[j] || (a.features.edges_at[i] && b.features.edges_at[j]);
+bool are_tested(const Tree& tree, const FilterView* filter, const LeafCorners<Real>& a, std::uint32_t i,
+                const LeafCorners<Real>& b, std::uint32_t j) {
+  const std::uint32_t edges_a = a.features.edges_at[i], edges_b = b.features.edges_at[j];
+  if (!filter) return a.features.faces_at[i] || b.features.faces_at[j] || (edges_a && edges_b);
+  const auto in_face = [&](const auto& of, std::uint32_t k, const auto& others, std::uint32_t l) {
+    return any_of(others.features.faces_at[l], [&](std::uint32_t face) {
+      return !filter->vertex_face(of.vertices[k], tree.face_of_slot[others.leaf.first_face + face]);
+    });
+  };
+  return in_face(a, i, b, j) || in_face(b, j, a, i) || any_of(edges_a, [&](std::uint32_t of_a) {
+           return any_of(edges_b, [&](std::uint32_t of_b) {
+             return !filter->edge_edge(tree.edge_of_slot[a.leaf.first_edge + of_a],
+                                       tree.edge_of_slot[b.leaf.first_edge + of_b]);
+           });
+         });
 }
 
 template <class Real>
-double distance_of_corners(const Tree& tree, const MotionBounds& snapshot, NodePair leaves) {
+double distance_of_corners(const Tree& tree, const MotionBounds& snapshot, const FilterView* filter, NodePair leaves) {
   const LeafCorners<Real> of_a(tree, snapshot, tree.nodes[leaves.a].leaf),
       of_b(tree, snapshot, tree.nodes[leaves.b].leaf);
   constexpr Real infinity = std::numeric_limits<Real>::infinity();
@@ -65,7 +87,7 @@ double distance_of_corners(const Tree& tree, const MotionBounds& snapshot, NodeP
         const Real d = of_a.at[i][k] - of_b.at[j][k];
         square += d * d;
       }
-      if (square < least && are_tested(of_a, i, of_b, j)) least = square, nearest[0] = i, nearest[1] = j;
+      if (square < least && are_tested(tree, filter, of_a, i, of_b, j)) least = square, nearest[0] = i, nearest[1] = j;
     }
   if (least == infinity) return std::numeric_limits<double>::infinity();
   const auto &x = snapshot.vertices[of_a.vertices[nearest[0]]].t0, &y = snapshot.vertices[of_b.vertices[nearest[1]]].t0;
@@ -74,12 +96,12 @@ double distance_of_corners(const Tree& tree, const MotionBounds& snapshot, NodeP
 
 }  // namespace
 
-double distance_of_near_corners(const Tree& tree, const MotionBounds& snapshot, const FineBoxes* fine, std::uint32_t a,
-                                std::uint32_t b) {
+double distance_of_near_corners(const Tree& tree, const MotionBounds& snapshot, const FineBoxes* fine,
+                                const FilterView* filter, std::uint32_t a, std::uint32_t b) {
   if (fine)
     return distance_of_corners<double>(
-        tree, snapshot, near_leaves(tree, {a, b}, [&](NodePair p) { return fine->square_of_gap(p.a, p.b); }));
-  return distance_of_corners<float>(tree, snapshot, near_leaves(tree, {a, b}, [&](NodePair p) {
+        tree, snapshot, filter, near_leaves(tree, {a, b}, [&](NodePair p) { return fine->square_of_gap(p.a, p.b); }));
+  return distance_of_corners<float>(tree, snapshot, filter, near_leaves(tree, {a, b}, [&](NodePair p) {
                                       return tree.nodes[p.a].square_of_gap(tree.nodes[p.b]);
                                     }));
 }

@@ -25,9 +25,12 @@ bool NearestPair::before(const NearestPair& other) const {
   return key(*this) < key(other);
 }
 
-NearestPairs::NearestPairs(const MeshPairs& pairs, const Features& features, const MotionBounds& motion,
-                           const Tree& tree, const ThicknessTable& thickness)
+NearestPairs::NearestPairs(const MeshPairs& pairs, const PairRules& rules, const FilterView* filter,
+                           const Features& features, const MotionBounds& motion, const Tree& tree,
+                           const ThicknessTable& thickness)
     : pairs_(pairs),
+      rules_(rules),
+      filter_(filter),
       features_(features),
       motion_(motion),
       tree_(tree),
@@ -72,8 +75,9 @@ void NearestPairs::begin(std::uint32_t a, std::uint32_t b) {
   const std::uint32_t mesh_a = tree_.nodes[a].mesh, mesh_b = tree_.nodes[b].mesh;
   Entry& entry = at(mesh_a, mesh_b);
   if (entry.begun.exchange(true, std::memory_order_relaxed)) return;
+  const FilterView* filter = rules_.rule(mesh_a, mesh_b).filtered ? filter_ : nullptr;
   const double most_lack = thickness_.even(mesh_a) && thickness_.even(mesh_b) ? 0 : lack(mesh_a, mesh_b, 0);
-  const double distance = distance_of_near_corners(tree_, motion_, fine_.get(), a, b) + most_lack;
+  const double distance = distance_of_near_corners(tree_, motion_, fine_.get(), filter, a, b) + most_lack;
   if (!(distance < std::numeric_limits<double>::infinity())) return;
   const std::lock_guard lock(entry.lock);
   // The computed distance of the nearest pair may exceed the limit by the rounding of the test; the pair must be found

@@ -12,6 +12,8 @@
 #include "bvh/motion_bounds.h"
 #include "bvh/tree.h"
 #include "elementary/pair.h"
+#include "scene/feature_filter.h"
+#include "scene/pair_rules.h"
 #include "scene/thickness.h"
 #include "traverse/fine_boxes.h"
 #include "traverse/mesh_pairs.h"
@@ -32,8 +34,8 @@ struct NearestPair {
 class NearestPairs {
  public:
   // The arguments must outlive the object.
-  NearestPairs(const MeshPairs& pairs, const Features& features, const MotionBounds& motion, const Tree& tree,
-               const ThicknessTable& thickness);
+  NearestPairs(const MeshPairs& pairs, const PairRules& rules, const FilterView* filter, const Features& features,
+               const MotionBounds& motion, const Tree& tree, const ThicknessTable& thickness);
 
   // Features farther apart than this along an axis, in coordinates of the boxes, cannot improve the result.
   float reach(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
@@ -84,6 +86,8 @@ class NearestPairs {
   Entry& at(std::uint32_t a, std::uint32_t b) const { return entries_[pairs_.number(a, b)]; }
 
   const MeshPairs& pairs_;
+  const PairRules& rules_;
+  const FilterView* filter_;
   const Features& features_;
   const MotionBounds& motion_;
   const Tree& tree_;

@@ -14,6 +14,7 @@
 #include "elementary/fallback.h"
 #include "elementary/intersection_batch.h"
 #include "elementary/policy.h"
+#include "scene/feature_filter.h"
 #include "traverse/drift.h"
 #include "traverse/far_pairs.h"
 #include "traverse/leaf_edge_faces.h"
@@ -38,6 +39,7 @@ struct Search {
   const PairRules& rules;
   const Simd simd;
   Geometry geometry{};
+  const FilterView* filter = nullptr;  // for pairs of meshes with a filter
   // Tests of pairs of features, by number of the rule; edge-face tests are the same for all rules.
   BatchTest batch_test[n_rules];
   Fallback fallback[n_rules];

@@ -102,7 +102,8 @@ void ProximitySearch::test_leaves(LeafPair pair, Worker& worker) const {
 }
 
 void IntersectionSearch::test_leaves(LeafPair pair, Worker& worker) const {
-  worker.test_edge_faces([&](CandidateBuffer& edge_face) {
+  const Rule rule = rules.rule(tree.node_of_leaf(pair.first).mesh, tree.node_of_leaf(pair.second).mesh);
+  worker.test_edge_faces(rule, [&](CandidateBuffer& edge_face) {
     leaf_edge_faces(tree, tree.leaves[pair.first], tree.leaves[pair.second], edge_face);
   });
 }
@@ -125,7 +126,7 @@ void DistanceSearch::test_leaves(LeafPair pair, Worker& worker) const {
   const Rule rule = rules.rule(node_a.mesh, node_b.mesh);
   // If boxes of leaves do not touch, their features do not either.
   if (pair.first == pair.second || node_a.near_in_snapshot(node_b, 0))
-    worker.test_edge_faces([&](CandidateBuffer& edge_face) { leaf_edge_faces(tree, a, b, edge_face); });
+    worker.test_edge_faces(rule, [&](CandidateBuffer& edge_face) { leaf_edge_faces(tree, a, b, edge_face); });
   const double limit = nearest.limit(node_a.mesh, node_b.mesh);
   if (limit < 0) return;  // they intersect
   const float reach = nearest.reach(node_a.mesh, node_b.mesh);

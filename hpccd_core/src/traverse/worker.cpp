@@ -24,6 +24,7 @@ void Worker::begin(Search& search) {
   edge_face.clear();
   for (BatchCounts& c : counts) c = {};
   for (FallbackCounts& c : fallbacks) c = {};
+  for (std::uint64_t& n : ignored) n = 0;
   node_pairs = leaf_pairs = 0;
   elementary_seconds = 0;
   elementary_ticks = 0;
@@ -61,6 +62,27 @@ std::size_t Worker::bytes() const {
                   sizeof(BatchResult) + (edge_faces_ ? sizeof(CandidateBuffer) : 0);
   for (const auto& w : waiting_) b += w ? sizeof(Waiting) : 0;
   return b;
+}
+
+// Drops the pairs from `begin` on that a filter ignores.
+void Worker::drop_ignored(CandidateBuffer& buffer, std::uint32_t begin, Kind kind) {
+  const FilterView& filter = *search_->filter;
+  const auto keep_unless = [&](auto&& is_ignored) {
+    std::uint32_t n = begin;
+    for (std::uint32_t i = begin; i < buffer.n; ++i) {
+      const std::uint32_t first = buffer.first[i], second = buffer.second[i];
+      buffer.first[n] = first, buffer.second[n] = second;
+      n += !is_ignored(first, second);
+    }
+    ignored[static_cast<int>(kind)] += buffer.n - n;
+    buffer.n = n;
+  };
+  if (kind == Kind::edge_edge)
+    keep_unless([&](std::uint32_t a, std::uint32_t b) { return filter.edge_edge(a, b); });
+  else if (kind == Kind::vertex_face)
+    keep_unless([&](std::uint32_t v, std::uint32_t f) { return filter.vertex_face(v, f); });
+  else
+    keep_unless([&](std::uint32_t e, std::uint32_t f) { return filter.edge_face(e, f); });
 }
 
 void Worker::drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t keep_below) {

@@ -45,16 +45,23 @@ class alignas(128) Worker {
   template <class Add>
   void test_candidates(Rule rule, Add&& add) {
     Waiting& waiting = waiting_by(rule);
+    const std::uint32_t n_edge_edge = waiting.edge_edge.n, n_vertex_face = waiting.vertex_face.n;
     add(waiting.edge_edge, waiting.vertex_face);
+    if (rule.filtered) {
+      drop_ignored(waiting.edge_edge, n_edge_edge, Kind::edge_edge);
+      drop_ignored(waiting.vertex_face, n_vertex_face, Kind::vertex_face);
+    }
     const std::uint32_t full = full_batch();
     if (waiting.edge_edge.n >= full) drain(waiting.edge_edge, Kind::edge_edge, rule, full);
     if (waiting.vertex_face.n >= full) drain(waiting.vertex_face, Kind::vertex_face, rule, full);
   }
   // The same for edge-face pairs: add(edge_face).
   template <class Add>
-  void test_edge_faces(Add&& add) {
+  void test_edge_faces(Rule rule, Add&& add) {
     if (!edge_faces_) edge_faces_ = std::make_unique<CandidateBuffer>();
+    const std::uint32_t n = edge_faces_->n;
     add(*edge_faces_);
+    if (rule.filtered) drop_ignored(*edge_faces_, n, Kind::edge_face);
     if (edge_faces_->n >= batch_capacity) drain(*edge_faces_, Kind::edge_face, {}, batch_capacity);
   }
   // Tests pairs of one kind immediately.
@@ -75,6 +82,7 @@ class alignas(128) Worker {
   std::vector<Contact> vertex_face, edge_edge, edge_face;
   BatchCounts counts[3];  // by kind
   FallbackCounts fallbacks[3];
+  std::uint64_t ignored[3] = {};  // candidates dropped by filters, by kind
   std::uint64_t node_pairs = 0, leaf_pairs = 0;
   double elementary_seconds = 0;
   std::uint64_t elementary_ticks = 0;      // the same time, for the share of the k-DOP filter in it
@@ -95,6 +103,7 @@ class alignas(128) Worker {
   std::uint32_t full_batch() const {
     return grows_batches_ ? growing_batch_ : first_batches_ > 0 ? first_batch : batch_capacity;
   }
+  void drop_ignored(CandidateBuffer& buffer, std::uint32_t begin, Kind kind);
   void drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t keep_below);
   void keep(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule);
   void test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule);

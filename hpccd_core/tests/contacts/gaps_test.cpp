@@ -95,11 +95,12 @@ TEST(Gaps, WhereAnEdgeMeetsAFaceThePointsLieOnBoth) {
 struct Nothing {
   std::shared_ptr<const Scene> scene = test::two_sheets(3);
   Features features = features_of(*scene);
-  MeshPairs pairs{PairRules(*scene, Accuracy::exact, SeparationTable(*scene, 0)), scene->meshes().size()};
+  PairRules rules{*scene, Accuracy::exact, SeparationTable(*scene, 0)};
+  MeshPairs pairs{rules, scene->meshes().size()};
   MotionBounds motion;
   Tree tree;
   ThicknessTable thickness{*scene, features};
-  NearestPairs nearest{pairs, features, motion, tree, thickness};
+  NearestPairs nearest{pairs, rules, nullptr, features, motion, tree, thickness};
   Cancellation cancellation;
 
   std::vector<Gap> gaps() const { return collect_gaps(nearest, {}, cancellation); }
