@@ -45,7 +45,6 @@ class SceneBuilder:
                 n_vertices=topology.n_vertices,
                 self_collision=mesh.self_collision,
                 static=mesh.static,
-                **({"points": True} if mesh.points else {}),
             )
         for plane in self.planes:
             scene.add_plane(plane.name, plane.normal, plane.offset)

@@ -35,7 +35,6 @@ class MeshSettings:
     pose: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
     input: str = ""
     whole: bool = False  # each message with vertices contains the topology
-    points: bool = False  # vertices in no face and no edge are points
     ignored_rings: int = 0
     ignored_at_rest: float | None = None
 

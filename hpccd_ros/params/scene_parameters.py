@@ -62,6 +62,8 @@ def mesh_settings(meshes: MeshValues) -> tuple[MeshSettings, ...]:
             tuple(of["pose"]),
             of["input"],
             whole=of["input"] in WHOLE,
+            ignored_rings=of["ignored_rings"],
+            ignored_at_rest=of["ignored_at_rest"] if of["ignored_at_rest"] >= 0 else None,
         )
         for name, of in meshes.items()
     )
@@ -150,6 +152,7 @@ def check(settings: dict[str, Any], meshes: MeshValues, robots: Robots = NO_ROBO
     if set(settings["robots"]) <= set(robots):
         check_stop(settings, scene_builder(settings, meshes, robots))
     for name, values in meshes.items():
+        _check_filters(name, values)
         if values["file"] and values["input"] in WHOLE:
             raise ParameterError(
                 f"mesh.{name}.file: with mesh.{name}.input {values['input']} each message carries the triangles; leave "
@@ -185,6 +188,16 @@ def check_stop(settings: dict[str, Any], builder: SceneBuilder) -> None:
             "stop_distance: no two different meshes are tested against each other, so nothing could ever be near; name "
             "two in meshes of which one moves and that ignored_pairs does not name, or leave stop_distance negative"
         )
+
+
+def _check_filters(name: str, values: dict[str, Any]) -> None:
+    within = values["self_collision"] and not values["static"] and values["input"] not in (POSE, TF)
+    for key, off in (("ignored_rings", 0), ("ignored_at_rest", -1.0)):
+        if values[key] != off and not within:
+            raise ParameterError(
+                f"mesh.{name}.{key}: {values[key]} leaves out pairs within the mesh, which is not tested against "
+                "itself (static, self_collision: false, or moved by poses); leave it out"
+            )
 
 
 def _check_rigid(name: str, values: dict[str, Any], settings: dict[str, Any]) -> None:

@@ -589,6 +589,26 @@ MESH_ROWS = (
     Row("static", "bool", False, "Does not move: positions from the file or from one message"),
     Row("self_collision", "bool", True, "Test the mesh against itself"),
     Row(
+        "ignored_rings",
+        "int",
+        0,
+        "Do not test features of the mesh against each other that are joined by at most this number of edges; 0: only "
+        "those that share a vertex. For thickness beyond the length of edges",
+        span=(0, 1000),
+        example=2,
+    ),
+    Row(
+        "ignored_at_rest",
+        "float",
+        -1.0,
+        "Do not test features of the mesh against each other that are within this distance at rest: in `file`; without "
+        "a file, in the first frame with these triangles. 0: those that touch; -1: test all",
+        unit="unit of the vertices",
+        span=(-1.0, FARTHEST),
+        least=0.0,
+        example=0.005,
+    ),
+    Row(
         "file",
         "string",
         "",

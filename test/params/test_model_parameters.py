@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of planes, thickness and coarse meshes: the scene they describe, and bad values."""
+"""Parameters of planes, thickness, coarse meshes and ignored neighbours: the scene they describe, and bad values."""
 
 import math
 
@@ -53,6 +53,12 @@ def test_markers_show_nearest_points_of_thick_meshes():
     assert scene_parameters.detector_options(settings).outputs == ("points", "normals", "closest")
 
 
+def test_meshes():
+    cloth, ball = builder(mesh__cloth__ignored_rings=2, mesh__cloth__ignored_at_rest=0.0).meshes
+    assert (cloth.ignored_rings, cloth.ignored_at_rest) == (2, 0.0)
+    assert (ball.ignored_rings, ball.ignored_at_rest) == (0, None)
+
+
 @pytest.mark.parametrize(
     "given, text",
     [
@@ -82,6 +88,13 @@ def test_markers_show_nearest_points_of_thick_meshes():
         ),
         ({"stop_detail": ["cloth:0.1"], "planes": ["floor"]}, "stop_detail: is not offered with planes"),
         ({"planes": ["floor"], "thickness": ["floor:1"]}, "'floor' is a plane, which has none: shift its offset"),
+        ({"mesh__cloth__ignored_rings": -1}, "mesh.cloth.ignored_rings: -1 is outside 0 .. 1000"),
+        (
+            {"mesh__cloth__ignored_at_rest": -0.5},
+            "mesh.cloth.ignored_at_rest: -0.5 is not valid; use -1, or at least 0",
+        ),
+        ({"mesh__cloth__ignored_rings": 2, "mesh__cloth__self_collision": False}, "not tested against itself"),
+        ({"mesh__cloth__ignored_at_rest": 0.1, "mesh__cloth__static": True}, "mesh.cloth.ignored_at_rest: 0.1 leaves"),
     ],
 )
 def test_bad_values_are_named(given, text):
