@@ -275,7 +275,7 @@ class DetailedCore:
                 for rows, columns in zip(pairs, (1, 4, 2), strict=True):
                     rows[:, :columns] = np.searchsorted(level.vertices, rows[:, :columns]) + first_vertex
                     rows[:, columns:] += np.uint32(first_face)
-                if any(map(len, pairs)) and hasattr(_core.Scene, "ignore_features"):
+                if any(map(len, pairs)):
                     scene._repeat("ignore_features", pairs)
         ignored: dict[tuple[int, int], list[Indices]] = {}
         for name, values in self.calls:

@@ -420,8 +420,6 @@ def test_separations_and_thickness_of_a_detector_change():
 
 def test_ignored_faces_are_ignored_where_the_whole_patch_is():
     scene, start, end = two_bodies(np.random.default_rng(6), self_collision=False)
-    if not hasattr(scene, "ignore_faces"):
-        pytest.skip("no filters")
     assert len(hc.Detector(scene, detail=0.2).detect(start, end))
     scene.ignore_faces("sheet", np.arange(288), "ball")
     assert not len(hc.Detector(scene, detail=0.2).detect(start, end))
