@@ -235,6 +235,24 @@ def test_any_magnitude(size):
     assert pairs <= {tuple(r) for r in found.vf.tolist()}
 
 
+@pytest.mark.parametrize("times_extent", [0.9, 1.01, 1.3, 1.7, 3.0])
+def test_one_thick_mesh_around_the_whole_scene(times_extent):
+    """Thickness on one side only: as a separation, half of which grows each side."""
+    rng = np.random.default_rng(4)
+    for corner in rng.choice([-1.0, 1.0], (8, 3)):
+        scene = hc.Scene()
+        scene.add_mesh("thin", [[0, 1, 2]])
+        scene.add_mesh("thick", [[0, 1, 2]], thickness=64 * times_extent)
+        vertices = rng.normal(0, 0.3, (6, 3))
+        vertices[3:] += 64 * corner
+        expected = hc.Detector(scene, backend="cpu")
+        expected.set_thickness("thick", 0.0)
+        expected.set_separation("thin", "thick", 64 * times_extent)
+        found = hc.Detector(scene, backend="cpu").detect(vertices, vertices)
+        assert found == expected.detect(vertices, vertices)
+        assert times_extent < 1.75 or len(found) == 15
+
+
 def detector_faces(meshes):
     firsts = np.cumsum([0, *meshes.n_vertices[:-1]])
     return [tuple(face + first) for faces, first in zip(meshes.faces, firsts, strict=True) for face in faces]

@@ -85,6 +85,11 @@ struct MotionBounds {
   double margin_of_mesh(std::size_t mesh) const { return margins_[mesh]; }
   // The largest amount by which its boxes have grown.
   double growth_of_mesh(std::size_t mesh) const { return margins_[mesh] + (thickest_.empty() ? 0 : thickest_[mesh]); }
+  // The same of its k-DOPs. Along a diagonal the scene is up to twice as long as along an axis, so the growth of boxes,
+  // which ends where they contain the scene, would not suffice.
+  double kdop_growth_of_mesh(std::size_t mesh) const {
+    return thicker_than_scene_ ? margins_[mesh] + 2 * thickest_[mesh] : growth_of_mesh(mesh);
+  }
   // Whether boxes have grown by less than their thickness, because it exceeds the scene.
   bool thicker_than_scene() const { return thicker_than_scene_; }
   std::size_t bytes() const;

@@ -86,7 +86,7 @@ MotionBox leaf_bounds(const Tree& tree, const LeafRange& leaf, const std::vector
 // Grows k-DOPs by half a separation on each side, like boxes: leaves with separated k-DOPs then contain no two features
 // that come within the separation of each other. The k-DOPs of features are compared with the same margin (KdopMargin).
 KdopMargin margin_of(const MotionBounds& motion, std::uint32_t mesh) {
-  return {motion.growth_of_mesh(mesh) + motion.rounding, motion.map.scale};
+  return {motion.kdop_growth_of_mesh(mesh) + motion.rounding, motion.map.scale};
 }
 
 void grow(Kdop& kdop, const KdopMargin& by) {
