@@ -60,7 +60,7 @@ def _names_of_a_step() -> Iterator[None]:
         raise _core.InvalidArgument(text) from None
 
 
-def _require_device(backend: str, method: str, planes: bool) -> None:
+def _require_device(backend: str, method: str, on_host: bool) -> None:
     """Raises ValueError where results cannot stay on a device."""
     if "gpu" not in backends():
         why = gpu_status()["reason"] or "the GPU backend is not part of this build"
@@ -69,8 +69,8 @@ def _require_device(backend: str, method: str, planes: bool) -> None:
         raise ValueError(f"results: 'device' is not offered by backend {backend!r}; use backend='gpu' or 'auto'")
     if method != "default":
         raise ValueError(f"results: 'device' is not offered by method {method!r}, which runs on CPUs; use 'default'")
-    if planes:
-        raise ValueError("results: 'device' is not offered for planes, which the host tests; use 'host'")
+    if on_host:
+        raise ValueError("results: 'device' is not offered for planes or points, which the host tests; use 'host'")
 
 
 class Detector(
@@ -236,7 +236,7 @@ class Detector(
         self.results = arguments.choice("results", results, RESULTS)
         self.method = arguments.choice("method", method, METHODS)
         if results == "device":
-            _require_device(backend, method, len(scene.layout.planes) > 0)
+            _require_device(backend, method, len(scene.layout.planes) > 0 or scene._has_points())
         self.refine = arguments.choice("refine", refine, REFINE)
         if detail is None and refine != "none":
             raise ValueError("refine: is for coarse meshes; give detail too, as in detail=0.1")

@@ -113,6 +113,73 @@ class Scene:
             self._repeat("set_thickness", (self._ids[name], numbers.copy()))
         return self._ids[name]
 
+    def add_points(
+        self,
+        name: str,
+        n: int,
+        *,
+        thickness: ArrayLike = 0.0,
+        edges: ArrayLike = _NOT_GIVEN,
+        self_collision: bool = True,
+        static: bool = False,
+    ) -> int:
+        """Add points or, with a thickness, spheres, and return the number of their mesh.
+
+        Points are tested against faces (`Contacts.vf`), against edges that are in no face (`ve`) and against each other
+        (`vv`), of all meshes.
+
+        Parameters
+        ----------
+        name : str
+            Unique name.
+        n : int
+            Number of vertices.
+        thickness : ArrayLike, scalar or shape (n,)
+            Radius of the spheres. With edges, one number or one for each edge.
+        edges : ArrayLike, shape (E, 2), integers
+            Segments between them: with a thickness, capsules. Vertices in an edge are no points: the edge is tested.
+        self_collision : bool
+            Whether contacts of these points with each other are reported.
+        static : bool
+            As in :meth:`add_mesh`.
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        TypeError, ValueError
+            As :meth:`add_mesh`.
+
+        Notes
+        -----
+        Scenes with points are computed on CPUs. Without a thickness or a separation two points touch only where they
+        coincide.
+
+        Examples
+        --------
+        >>> import hpccd_core as hc
+        >>> scene = hc.Scene()
+        >>> _ = scene.add_points("grains", 2, thickness=0.25)
+        >>> start, end = [[0.0, 0, 0], [2, 0, 0]], [[0.0, 0, 0], [0, 0, 0]]
+        >>> contacts = hc.Detector(scene).detect(start, end)
+        >>> contacts.vv.tolist(), contacts.vv_toc.tolist()
+        ([[0, 1]], [0.75])
+        """
+        name = arguments.text("name", name)
+        n, segments = arguments.whole_number("n", n, 0, _MOST), arguments.edges(edges)
+        self_collision, static = arguments.flag("self_collision", self_collision), arguments.flag("static", static)
+        numbers = arguments.thickness(thickness)
+        n_elements = len(segments) or n
+        if len(numbers) not in (1, n_elements):
+            raise ValueError(f"thickness: expected one number or {n_elements}, got {len(numbers)}")
+        none = np.empty((0, 3), np.uint32)
+        self._repeat("add_mesh", (name, none, n, self_collision, static, segments.copy(), True))
+        if numbers.any():
+            self._repeat("set_thickness", (self._ids[name], numbers.copy()))
+        return self._ids[name]
+
     def add_plane(
         self, name: str, normal: ArrayLike = (0.0, 0.0, 1.0), offset: float = 0.0, *, static: bool = True
     ) -> int:
@@ -384,6 +451,9 @@ class Scene:
         vars(self).update(state, _calls=[])
         for name, values in state["_calls"]:
             self._repeat(name, values)
+
+    def _has_points(self) -> bool:
+        return any(name == "add_mesh" and len(values) > 6 for name, values in self._calls)
 
     def _n_enabled_pairs(self) -> int:
         """How many pairs of meshes are tested, a mesh with itself included: by the rules of the core."""

@@ -23,7 +23,7 @@ set(hpccd_sources
   src/traverse/pair_pool.cpp src/traverse/snapshot_search.cpp src/traverse/worker.cpp
   src/contacts/canonical.cpp src/contacts/contours.cpp src/contacts/gaps.cpp
   src/contacts/intersection_place.cpp src/contacts/intersections.cpp
-  src/contacts/order.cpp src/contacts/parts.cpp src/contacts/places.cpp src/contacts/worlds.cpp
+  src/contacts/order.cpp src/contacts/parts.cpp src/contacts/places.cpp src/contacts/points.cpp src/contacts/worlds.cpp
   src/solid/closed.cpp src/solid/containment.cpp src/solid/curve_order.cpp src/solid/nearest_face.cpp src/solid/outside_list.cpp
   src/solid/free_place.cpp src/solid/moved_pair.cpp src/solid/penetration.cpp src/solid/points.cpp
   src/solid/translation.cpp src/solid/winding.cpp

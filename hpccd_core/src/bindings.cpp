@@ -371,11 +371,12 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
       .def(
           "add_mesh",
           [](Scene& s, const std::string& name, const Array<std::uint32_t>& faces, std::uint32_t n_vertices,
-             bool self_collision, bool is_static, const Array<std::uint32_t>& edges) {
+             bool self_collision, bool is_static, const Array<std::uint32_t>& edges, bool points) {
             return s.add_mesh(name, {faces.data(), static_cast<std::size_t>(faces.size())}, n_vertices,
-                              {self_collision, is_static}, {edges.data(), static_cast<std::size_t>(edges.size())});
+                              {self_collision, is_static, points},
+                              {edges.data(), static_cast<std::size_t>(edges.size())});
           },
-          "name"_a, "faces"_a, "n_vertices"_a, "self_collision"_a, "static"_a, "edges"_a)
+          "name"_a, "faces"_a, "n_vertices"_a, "self_collision"_a, "static"_a, "edges"_a, "points"_a = false)
       .def(
           "add_plane",
           [](Scene& s, const std::string& name, const std::array<double, 3>& normal, double offset, bool is_static) {

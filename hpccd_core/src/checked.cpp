@@ -31,9 +31,9 @@ std::shared_ptr<const Scene> checked(std::shared_ptr<const Scene> scene, const O
   check_range("hybrid_segments", o.hybrid_segments, 1, 65536);
   check_range("hybrid_segment_pairs", o.hybrid_segment_pairs, 1, 1 << 20);
   check_range("gpus", o.gpus, 0, 1024);
-  if (o.results_on_device && std::ranges::any_of(scene->meshes(), [](const auto& m) { return m.plane.has_value(); }))
-    throw InvalidArgument(
-        "results_on_device: planes are tested on the host; leave it false, or model each plane as a mesh");
+  if (o.results_on_device &&
+      std::ranges::any_of(scene->meshes(), [](const auto& m) { return m.plane || m.options.points; }))
+    throw InvalidArgument("results_on_device: planes and points are tested on the host; leave it false");
   if (o.gpus == 0 || (o.backend != Backend::hybrid && o.backend != Backend::automatic)) return scene;
   const auto here = static_cast<int>(gpu::status().devices.size());
   if (o.gpus > here)

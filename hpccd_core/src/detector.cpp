@@ -17,6 +17,7 @@
 #include "checked.h"
 #include "contacts/intersections.h"
 #include "contacts/outputs.h"
+#include "contacts/points.h"
 #include "gpu/results_to_device.h"
 #include "prepared_impl.h"
 #include "solid/closed.h"
@@ -235,11 +236,17 @@ struct Detector::Impl {
             {"vp_contacts", planes.add_contacts(d.contacts, backends().on_host(t0, 0), backends().on_host(t1, 1),
                                                 o.report, Outputs::of_contacts(o), common.pool)}};
       });
+      if (with_points()) {
+        split_points(d.contacts);
+        of_planes["vv_contacts"] = d.contacts.vv.size(), of_planes["ve_contacts"] = d.contacts.ve.size();
+      }
       note(picked, d.computed_by, d.contacts.vf.size(), d.contacts.ee.size());
       found->merge(of_planes);
       return {std::nullopt, std::move(d.contacts)};
     });
   }
+
+  bool with_points() const { return !common.features.edge_kinds.empty(); }
 
   // After a query without them: the planes of the scene, if there are any.
   template <class Query>
@@ -409,6 +416,10 @@ Proximity Detector::proximity(Positions vertices, double distance) {
       return Counts{{"vp_near", planes.add_near(*near, on_host, distance, Outputs::of_proximity(impl_->options()),
                                                 impl_->common.pool)}};
     });
+    if (impl_->with_points()) {
+      split_points(*near);
+      found["vv_near"] = near->vv.size(), found["ve_near"] = near->ve.size();
+    }
     found["vf_near"] = near->vf.size(), found["ee_near"] = near->ee.size();
     return near;
   }));

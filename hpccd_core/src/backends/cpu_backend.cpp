@@ -158,6 +158,8 @@ void CpuBackend::begin(Search& search, const MotionBounds& motion) const {
                      motion.kdops.data()};
   search.cancellation = &shared_.cancellation;
   search.filter = &shared_.common.filter.view();
+  if (const Features& f = shared_.features; !f.edge_kinds.empty())
+    search.edge_kinds = f.edge_kinds.data(), search.edge_kinds_of_mesh = f.edge_kinds_of_mesh.data();
 }
 
 void CpuBackend::traverse() {

@@ -16,6 +16,22 @@ using V = Vec3<double>;
 
 std::array<double, 3> point_of(const V& v) { return {v.x, v.y, v.z}; }
 
+// Of two edges, one or both may be points: a point is the first side.
+void name_points(Gap& gap) {
+  const auto [a0, a1, b0, b1] = gap.features;
+  if (a0 != a1 && b0 != b1) return;
+  gap.kind = a0 == a1 && b0 == b1 ? GapKind::vertex_vertex : GapKind::vertex_edge;
+  gap.features = a0 != a1   ? std::array{b0, a0, a1, 0u}
+                 : b0 == b1 ? std::array{a0, b0, 0u, 0u}
+                            : std::array{a0, b0, b1, 0u};
+  if (a0 == a1) return;
+  std::swap(gap.points[0], gap.points[1]);
+  std::ranges::rotate(gap.vertices, gap.vertices.begin() + 2),
+      std::ranges::rotate(gap.weights, gap.weights.begin() + 2);
+  for (double& w : gap.weights) w = -w;
+  for (double& x : gap.normal) x = -x;
+}
+
 Gap gap_of(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& found, const Geometry& g) {
   Gap gap{mesh_a, mesh_b};
   if (!(found.distance < INFINITY)) return gap;
@@ -43,6 +59,7 @@ Gap gap_of(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& found,
   pair_vertices(g, found.kind, found.first, found.second, gap.vertices.data());
   std::ranges::copy(places.weights, gap.weights.begin());
   gap.normal = point_of(places.normal);
+  if (found.kind == Kind::edge_edge) name_points(gap);
   return gap;
 }
 

@@ -35,12 +35,14 @@ double short_edge(const std::vector<std::array<std::uint32_t, 2>>& edges, std::s
   const EdgeSample sample = EdgeSample::of(edges.size(), wanted);
   if (sample.count == 0) return 0;
   std::array<double, 2 * edges_of_a_step> lengths;
+  EdgeSample found{sample.stride, 0};
   for (std::size_t i = 0; i < sample.count; ++i) {
     const auto& [from, to] = edges[i * sample.stride];
-    lengths[i] = length(from, to);
+    if (from != to) lengths[found.count++] = length(from, to);
   }
-  const auto at = lengths.begin() + static_cast<std::ptrdiff_t>(sample.short_one());
-  std::nth_element(lengths.begin(), at, lengths.begin() + static_cast<std::ptrdiff_t>(sample.count));
+  if (found.count == 0) return 0;  // points only
+  const auto at = lengths.begin() + static_cast<std::ptrdiff_t>(found.short_one());
+  std::nth_element(lengths.begin(), at, lengths.begin() + static_cast<std::ptrdiff_t>(found.count));
   return *at;
 }
 

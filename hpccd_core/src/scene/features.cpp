@@ -20,6 +20,34 @@ void group_by_owner(const std::vector<std::uint32_t>& owner, std::size_t n_primi
   for (std::uint32_t i = 0; i < owner.size(); ++i) owned[next[owner[i]]++] = i;
 }
 
+// Adds the edges from points to themselves.
+void add_points(Features& x, const Scene& scene, std::vector<std::uint32_t>& owner) {
+  std::vector<std::pair<std::array<std::uint32_t, 2>, std::uint32_t>> points;
+  for (std::uint32_t i = 0; i < x.lone_vertices.size(); ++i)
+    if (const std::uint32_t v = x.lone_vertices[i]; scene.meshes()[x.mesh_of_vertex[v]].options.points)
+      points.push_back({{v, v}, x.first_lone_vertex() + i});
+  if (points.empty()) return;
+  std::vector<std::array<std::uint32_t, 2>> edges;
+  std::vector<std::uint32_t> owners;
+  edges.reserve(x.edges.size() + points.size()), owners.reserve(x.edges.size() + points.size());
+  for (std::size_t i = 0, j = 0; i < x.edges.size() || j < points.size();) {
+    const bool from_points = i == x.edges.size() || (j < points.size() && points[j].first < x.edges[i]);
+    edges.push_back(from_points ? points[j].first : x.edges[i]);
+    owners.push_back(from_points ? points[j].second : owner[i]);
+    ++(from_points ? j : i);
+  }
+  x.edges = std::move(edges), owner = std::move(owners);
+  x.edge_kinds_of_mesh.resize(scene.meshes().size());
+  for (std::size_t e = 0; e < x.edges.size(); ++e) {
+    const EdgeKind kind = owner[e] < x.n_faces()             ? EdgeKind::of_face
+                          : owner[e] < x.first_lone_vertex() ? EdgeKind::lone
+                                                             : EdgeKind::point;
+    x.edge_kinds.push_back(kind);
+    x.edge_kinds_of_mesh[x.mesh_of_vertex[x.edges[e][0]]] |=
+        static_cast<unsigned char>(1u << static_cast<unsigned>(kind));
+  }
+}
+
 }  // namespace
 
 Features features_of(const Scene& scene, ThreadPool& pool) {
@@ -50,6 +78,7 @@ Features features_of(const Scene& scene, ThreadPool& pool) {
     x.mesh_of_primitive[x.first_lone_edge() + i] = x.mesh_of_vertex[x.lone_edges[i][0]];
   for (std::size_t i = 0; i < x.lone_vertices.size(); ++i)
     x.mesh_of_primitive[x.first_lone_vertex() + i] = x.mesh_of_vertex[x.lone_vertices[i]];
+  add_points(x, scene, edges.owner);
   parallel_for_each(pool, 2, [&](std::size_t i) {
     if (i == 0)
       group_by_owner(edges.owner, x.n_primitives(), x.first_edge, x.owned_edges);

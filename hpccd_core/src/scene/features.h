@@ -12,8 +12,14 @@
 
 namespace hpccd {
 
+// What an edge is part of. The edge from a point to itself and an edge of a face are never paired: the point is tested
+// against the face.
+enum class EdgeKind : unsigned char { lone, of_face, point = 3 };
+inline bool never_paired(EdgeKind a, EdgeKind b) { return (static_cast<unsigned>(a) ^ static_cast<unsigned>(b)) == 2; }
+
 struct Features {
-  std::vector<std::array<std::uint32_t, 2>> edges;  // v0 < v1, in lexicographic order: an edge's number is its rank
+  // v0 < v1, and v0 = v1 for points; in lexicographic order: an edge's number is its rank.
+  std::vector<std::array<std::uint32_t, 2>> edges;
   std::vector<std::array<std::uint32_t, 3>> faces;
   // The primitives of the hierarchy, by number: all triangles (the paper's representative triangles, to which features
   // are assigned), then edges of no triangle, then vertices of neither.
@@ -23,9 +29,13 @@ struct Features {
   // The features that primitive p represents: edges owned_edges[first_edge[p] .. first_edge[p+1]), vertices likewise.
   std::vector<std::uint32_t> first_edge, owned_edges, first_vertex, owned_vertices;
   std::uint32_t n_vertices = 0;
+  std::vector<EdgeKind> edge_kinds;  // of edges; empty if there are no points
+  // Of the edges of each mesh; empty as above. 2: all are of faces, 8: all are points, other values: other or several.
+  std::vector<unsigned char> edge_kinds_of_mesh;
 
   std::size_t bytes() const {
-    return (edges.capacity() + lone_edges.capacity()) * sizeof(edges[0]) + faces.capacity() * sizeof(faces[0]) +
+    return edge_kinds.capacity() + edge_kinds_of_mesh.capacity() +
+           (edges.capacity() + lone_edges.capacity()) * sizeof(edges[0]) + faces.capacity() * sizeof(faces[0]) +
            4 * (lone_vertices.capacity() + mesh_of_primitive.capacity() + mesh_of_vertex.capacity() +
                 first_edge.capacity() + owned_edges.capacity() + first_vertex.capacity() + owned_vertices.capacity());
   }

@@ -42,17 +42,18 @@ void ContactSearch::test_leaves(LeafPair pair, Worker& worker) const {
   const Node &node_a = tree.node_of_leaf(pair.first), &node_b = tree.node_of_leaf(pair.second);
   const LeafRange &a = tree.leaves[pair.first], &b = tree.leaves[pair.second];
   const Rule rule = rules.rule(node_a.mesh, node_b.mesh);
+  const TestedFeatures features = tested(rule, node_a.mesh, node_b.mesh);
   const PartOfMotion part = this->part();
   worker.test_candidates(rule, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
     const float less = excess.of(node_a, node_b);
     if (part.until < 1 && part.reach >= 0)
-      leaf_pairs_at_start(tree, a, b, rule.features, part.reach - less, edge_edge, vertex_face);
+      leaf_pairs_at_start(tree, a, b, features, part.reach - less, edge_edge, vertex_face);
     else if (less > 0)
-      leaf_pairs_less_excess(tree, a, b, rule.features, less, edge_edge, vertex_face);
+      leaf_pairs_less_excess(tree, a, b, features, less, edge_edge, vertex_face);
     else if (part.until < 1)
-      leaf_pairs_until(tree, a, b, rule.features, part.until, edge_edge, vertex_face);
+      leaf_pairs_until(tree, a, b, features, part.until, edge_edge, vertex_face);
     else
-      leaf_pairs(tree, a, b, rule.features, edge_edge, vertex_face);
+      leaf_pairs(tree, a, b, features, edge_edge, vertex_face);
   });
 }
 

@@ -77,6 +77,18 @@ struct Search {
   bool bounded() const { return most_found < std::numeric_limits<std::size_t>::max(); }
   bool gave_up() const { return bounded() && n_found.load(std::memory_order_relaxed) > most_found; }
   const Cancellation* cancellation = &never_cancelled;
+  // Null if no mesh has points.
+  const EdgeKind* edge_kinds = nullptr;
+  const unsigned char* edge_kinds_of_mesh = nullptr;
+  // Which features of two meshes are tested. A mesh of points and one whose edges are all of faces have no edge-edge
+  // pairs.
+  TestedFeatures tested(const Rule& rule, std::uint32_t mesh_a, std::uint32_t mesh_b) const {
+    TestedFeatures features = rule.features;
+    if (!edge_kinds_of_mesh || mesh_a == mixed_meshes || mesh_b == mixed_meshes) return features;
+    const unsigned a = edge_kinds_of_mesh[mesh_a], b = edge_kinds_of_mesh[mesh_b];
+    if ((a == 2 && b == 8) || (a == 8 && b == 2)) features.edge_edge = false;
+    return features;
+  }
 };
 
 // The part of a motion that matters.

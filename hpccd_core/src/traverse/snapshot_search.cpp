@@ -95,9 +95,11 @@ bool ProximitySearch::take(Kind kind, const Contact& pair, std::vector<Contact>&
 
 void ProximitySearch::test_leaves(LeafPair pair, Worker& worker) const {
   if (apart_by_hulls(tree, pair, reach, worker)) return;
-  const Rule rule = rules.rule(tree.node_of_leaf(pair.first).mesh, tree.node_of_leaf(pair.second).mesh);
+  const std::uint32_t mesh_a = tree.node_of_leaf(pair.first).mesh, mesh_b = tree.node_of_leaf(pair.second).mesh;
+  const Rule rule = rules.rule(mesh_a, mesh_b);
+  const TestedFeatures features = tested(rule, mesh_a, mesh_b);
   worker.test_candidates(rule, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-    leaf_pairs(tree, tree.leaves[pair.first], tree.leaves[pair.second], rule.features, reach, edge_edge, vertex_face);
+    leaf_pairs(tree, tree.leaves[pair.first], tree.leaves[pair.second], features, reach, edge_edge, vertex_face);
   });
 }
 

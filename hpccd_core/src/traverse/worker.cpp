@@ -109,6 +109,30 @@ void Worker::drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t 
   elementary_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+namespace {
+
+template <class Drop>
+void drop_pairs(CandidateBuffer& pairs, std::uint32_t begin, Drop&& drop) {
+  std::uint32_t n = begin;
+  for (std::uint32_t i = begin; i < pairs.n; ++i) {
+    pairs.first[n] = pairs.first[i], pairs.second[n] = pairs.second[i];
+    n += !drop(pairs.first[i], pairs.second[i]);
+  }
+  pairs.n = n;
+}
+
+}  // namespace
+
+void Worker::drop_points_at_faces(CandidateBuffer& edge_edge, std::uint32_t begin) const {
+  const EdgeKind* kinds = search_->edge_kinds;
+  drop_pairs(edge_edge, begin, [&](std::uint32_t a, std::uint32_t b) { return never_paired(kinds[a], kinds[b]); });
+}
+
+void Worker::drop_points(CandidateBuffer& edge_face, std::uint32_t begin) const {
+  const EdgeKind* kinds = search_->edge_kinds;
+  drop_pairs(edge_face, begin, [&](std::uint32_t edge, std::uint32_t) { return kinds[edge] == EdgeKind::point; });
+}
+
 void Worker::test_pairs(std::span<const std::uint32_t> first, std::span<const std::uint32_t> second, Kind kind,
                         Rule rule) {
   for (std::size_t i = 0; i < first.size(); i += batch_capacity) {

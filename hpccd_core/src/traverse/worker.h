@@ -51,6 +51,7 @@ class alignas(128) Worker {
       drop_ignored(waiting.edge_edge, n_edge_edge, Kind::edge_edge);
       drop_ignored(waiting.vertex_face, n_vertex_face, Kind::vertex_face);
     }
+    if (search_->edge_kinds) drop_points_at_faces(waiting.edge_edge, n_edge_edge);
     const std::uint32_t full = full_batch();
     if (waiting.edge_edge.n >= full) drain(waiting.edge_edge, Kind::edge_edge, rule, full);
     if (waiting.vertex_face.n >= full) drain(waiting.vertex_face, Kind::vertex_face, rule, full);
@@ -62,6 +63,7 @@ class alignas(128) Worker {
     const std::uint32_t n = edge_faces_->n;
     add(*edge_faces_);
     if (rule.filtered) drop_ignored(*edge_faces_, n, Kind::edge_face);
+    if (search_->edge_kinds) drop_points(*edge_faces_, n);
     if (edge_faces_->n >= batch_capacity) drain(*edge_faces_, Kind::edge_face, {}, batch_capacity);
   }
   // Tests pairs of one kind immediately.
@@ -104,6 +106,9 @@ class alignas(128) Worker {
     return grows_batches_ ? growing_batch_ : first_batches_ > 0 ? first_batch : batch_capacity;
   }
   void drop_ignored(CandidateBuffer& buffer, std::uint32_t begin, Kind kind);
+  // Of the pairs from `begin` on.
+  void drop_points_at_faces(CandidateBuffer& edge_edge, std::uint32_t begin) const;
+  void drop_points(CandidateBuffer& edge_face, std::uint32_t begin) const;
   void drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t keep_below);
   void keep(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule);
   void test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule);
