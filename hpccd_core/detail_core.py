@@ -216,8 +216,10 @@ class DetailedCore:
         features: tuple[bool, bool],
     ) -> None:
         self.calls, self.layout, self.report = list(scene._calls), scene.layout, report
-        if len(self.layout.planes):
-            raise ValueError("detail: not offered for scenes with planes; test those with a detector without detail")
+        if len(self.layout.planes) or scene._has_points():
+            raise ValueError(
+                "detail: not offered for scenes with planes or points; test those with a detector without detail"
+            )
         self.scene = object.__new__(Scene)
         self.scene.__setstate__({"_calls": self.calls})
         self.options = options

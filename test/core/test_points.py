@@ -259,6 +259,9 @@ def test_options_of_points():
         scene.add_points("others", 2, thickness=[1.0, 2, 3])
     with pytest.raises(ValueError, match="n"):
         scene.add_points("others", -1)
+    for options in ({"detail": 0.5}, {"results": "device"}):
+        with pytest.raises(ValueError, match="detail|results"):
+            hc.Detector(scene, **options)
     if "gpu" in hc.backends():
         with pytest.raises(ValueError, match="points"):
             hc.Detector(scene, backend="gpu")
