@@ -164,7 +164,7 @@ class Scene:
         >>> _ = scene.add_points("grains", 2, thickness=0.25)
         >>> start, end = [[0.0, 0, 0], [2, 0, 0]], [[0.0, 0, 0], [0, 0, 0]]
         >>> contacts = hc.Detector(scene).detect(start, end)
-        >>> contacts.vv.tolist(), contacts.vv_toc.tolist()
+        >>> contacts.vv.tolist(), contacts.vv_toc.round(6).tolist()
         ([[0, 1]], [0.75])
         """
         name = arguments.text("name", name)
