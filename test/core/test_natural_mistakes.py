@@ -210,10 +210,10 @@ MISTAKES = {
     ),
     "contacts by number": (
         lambda: detect(BOTH, BOTH)()[0],
-        "^Contacts: not a sequence; its rows are in the arrays vf, vf_toc, ee, ee_toc$",
+        "^Contacts: not a sequence; its rows are in the arrays vf, vf_toc, ee, ee_toc, .*ve, ve_toc$",
     ),
     "a loop over contacts": (lambda: list(detect(BOTH, BOTH)()), "^Contacts: not a sequence"),
-    "proximity by number": (lambda: detector()().proximity(BOTH, 1)[0], "^Proximity: .*ee_distance$"),
+    "proximity by number": (lambda: detector()().proximity(BOTH, 1)[0], "^Proximity: .*ve_distance$"),
     "intersections by number": (lambda: detector()().intersections(BOTH)[0], "^Intersections: .*arrays ef$"),
     "positions of faces from 1": (
         lambda: hc.Detector(one_based()).detect(CLOTH, CLOTH),

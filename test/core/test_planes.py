@@ -411,3 +411,17 @@ def test_stats_and_profile():
     detector.proximity(TRIANGLE, 2.0)
     assert detector.stats["vp_near"] == 1
     assert "vp_contacts" not in hc.Detector(hc.Scene()).stats
+
+
+def test_conservative_times_are_not_late():
+    """Starts and ends on integer heights: most times are no doubles, and are rounded up as often as down."""
+    heights = [(a, -b) for a in range(1, 30) for b in range(1, 30)]
+    scene = hc.Scene()
+    scene.add_points("points", len(heights))
+    scene.add_plane("floor")
+    start, end = (np.array([[0.0, 0.0, h[k]] for h in heights]) for k in (0, 1))
+    found = hc.Detector(scene, accuracy="conservative", backend="cpu").detect(start, end)
+    true = [Fraction(a, a - b) for a, b in heights]
+    for (vertex, _), toc in zip(found.vp.tolist(), found.vp_toc.tolist(), strict=True):
+        assert true[vertex] - Fraction(3, 10**12) < Fraction(toc) <= true[vertex]
+    assert len(found.vp) == len(heights)

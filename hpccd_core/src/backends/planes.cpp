@@ -67,20 +67,25 @@ bool mark(const HalfSpace& h, const Real* x, std::size_t n, unsigned char* open)
   }
 }
 
+constexpr double time_error = 1e-12;  // of HalfSpace::time
+
 V at_time(const V& x0, const V& x1, double t) { return t <= 0 ? x0 : t >= 1 ? x1 : x0 + t * (x1 - x0); }
 
 std::array<double, 3> row(const V& v) { return {v.x, v.y, v.z}; }
 
 }  // namespace
 
-Planes::Planes(const Scene& scene, const SeparationTable& separations, const ThicknessTable& thickness,
-               const FeatureFilter& filter)
+Planes::Planes(const Scene& scene, Accuracy accuracy, const SeparationTable& separations,
+               const ThicknessTable& thickness, const FeatureFilter& filter)
     : scene_(scene), separations_(separations), thickness_(thickness), filter_(filter) {
   const auto& meshes = scene.meshes();
   for (std::uint32_t m = 0; m < meshes.size(); ++m) {
     if (!meshes[m].plane) continue;
-    OfScene of{m, *meshes[m].plane, std::vector<char>(meshes.size())};
-    for (std::uint32_t other = 0; other < meshes.size(); ++other) of.tested[other] = scene.pair_enabled(m, other);
+    OfScene of{m, *meshes[m].plane, std::vector<char>(meshes.size()), std::vector<char>(meshes.size())};
+    for (std::uint32_t other = 0; other < meshes.size(); ++other) {
+      of.tested[other] = scene.pair_enabled(m, other);
+      of.early[other] = scene.pair_accuracy(m, other, accuracy) == Accuracy::conservative;
+    }
     planes_.push_back(std::move(of));
   }
 }
@@ -125,10 +130,11 @@ void Planes::for_parts(std::size_t begin, std::size_t end, const Query& query, F
 template <class Real>
 void Planes::find(const Query& query, std::size_t begin, std::size_t end, std::vector<Hit>& hits) const {
   const Real *x0 = numbers<Real>(query.t0), *x1 = numbers<Real>(query.t1);
-  const auto test = [&](std::size_t i, std::uint32_t plane, const HalfSpace& h, double thickness) {
+  const auto test = [&](std::size_t i, std::uint32_t mesh, std::uint32_t plane, const HalfSpace& h, double thickness) {
     const V v = position(x0, i);
     if (!query.distance) {
-      if (const auto time = h.time(v, position(x1, i))) hits.push_back({i, plane, *time});
+      if (const auto time = h.time(v, position(x1, i)))
+        hits.push_back({i, plane, planes_[plane].early[mesh] ? std::max(0.0, *time - time_error) : *time});
     } else if (h.within(v)) {
       hits.push_back({i, plane, h.distance(v) - thickness});
     }
@@ -144,9 +150,9 @@ void Planes::find(const Query& query, std::size_t begin, std::size_t end, std::v
       if (filter_.ignores(v, planes_[plane].mesh)) continue;
       const double thickness = thickness_of_vertex(v);
       if (thickness_.even(mesh))
-        test(i, plane, h, thickness);
+        test(i, mesh, plane, h, thickness);
       else
-        test(i, plane, {planes_[plane].plane, reach(plane, mesh, thickness, query)}, thickness);
+        test(i, mesh, plane, {planes_[plane].plane, reach(plane, mesh, thickness, query)}, thickness);
     }
   };
   for_parts(begin, end, query,
@@ -253,11 +259,10 @@ std::size_t Planes::add_near(Contacts& near, Positions vertices, double distance
 }
 
 void Planes::limit_steps(std::vector<double>& first, Positions t0, Positions t1, ThreadPool& pool) const {
-  constexpr double error = 1e-12;  // of HalfSpace::time
   for (const auto& piece : find({t0, t1, {}}, pool))
     for (const Hit& hit : piece) {
       double& time = first[hit.vertex / scene_.n_vertices()];
-      time = std::min(time, std::max(0.0, hit.value - error));
+      time = std::min(time, std::max(0.0, hit.value - time_error));
     }
 }
 

@@ -19,7 +19,8 @@ namespace hpccd {
 
 class Planes {
  public:
-  Planes(const Scene& scene, const SeparationTable& separations, const ThicknessTable& thickness,
+  // accuracy: of pairs without their own.
+  Planes(const Scene& scene, Accuracy accuracy, const SeparationTable& separations, const ThicknessTable& thickness,
          const FeatureFilter& filter);
 
   bool any() const { return !planes_.empty(); }
@@ -45,6 +46,7 @@ class Planes {
     std::uint32_t mesh;  // its number among the meshes
     Plane plane;
     std::vector<char> tested;  // by mesh
+    std::vector<char> early;   // by mesh: whether times must not be later than they are
   };
   struct Hit {
     std::size_t vertex;  // through all worlds

@@ -19,7 +19,7 @@ Common::Common(std::shared_ptr<const Scene> of, const Options& wanted, int threa
       thickness(*scene, features),
       rules(*scene, wanted.accuracy, separations, wanted.features),
       filter(*scene, features, pairs_at_rest(*scene, features, pool.size()), pool),
-      planes(*scene, separations, thickness, filter),
+      planes(*scene, wanted.accuracy, separations, thickness, filter),
       settled_(separations.version()) {
   require_some("features", wanted.features);
   if (wanted.worlds < 1 || wanted.worlds > Options::most_worlds)

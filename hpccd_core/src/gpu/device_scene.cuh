@@ -180,6 +180,7 @@ class DeviceScene {
     upload_pairs(filtered_, filtered);
     for (std::size_t i = 0; i < FeatureFilter::n_tables; ++i) {
       const FeatureFilter::Rows& rows = filter.rows()[i];
+      if (rows.first.empty()) continue;  // a buffer is never empty once it is written
       upload(first_[i], rows.first.data(), rows.first.size());
       upload(values_[i], rows.values.data(), rows.values.size());
     }

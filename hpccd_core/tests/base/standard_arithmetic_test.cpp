@@ -170,7 +170,8 @@ TEST_P(InOtherModes, JointsAndParts) {
     rigid::place_vertices(poses, std::vector<rigid::LinkMesh>{{2, 1}}, vertex, placed);
     const std::vector<std::array<std::uint32_t, 2>> vf{{0, 0}};
     const std::vector<double> toc{3e-310};
-    const ContactsOfPart part{vf, toc, {}, {}, {}, {}, {}, {}, {}, {}, 0, 3};
+    ContactsOfPart part{};
+    part.vf = vf, part.vf_toc = toc, part.part = 0, part.parts = 3;
     const Contacts step = contacts_of_step(std::vector{part});
     return std::vector<double>{b.acceleration, b.span,          b.rounding,     placed[0].x,   placed[0].y,
                                placed[0].z,    poses[2].turn.z, step.vf_toc[0], step.first_toc};

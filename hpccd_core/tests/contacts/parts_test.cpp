@@ -48,7 +48,11 @@ struct Part {
   }
   ContactsOfPart of(double part, double parts) const {
     const Contacts& c = contacts;
-    return {c.vf, c.vf_toc, c.ee, c.ee_toc, c.points, {}, {}, c.vertices, c.weights, c.approach, part, parts};
+    ContactsOfPart of;
+    of.vf = c.vf, of.vf_toc = c.vf_toc, of.ee = c.ee, of.ee_toc = c.ee_toc;
+    of.points = c.points, of.vertices = c.vertices, of.weights = c.weights, of.approach = c.approach;
+    of.part = part, of.parts = parts;
+    return of;
   }
 };
 
