@@ -11,7 +11,7 @@ import numpy as np
 
 import hpccd_core as hc
 
-from . import questions, solids
+from . import mixed, questions, solids
 from .motions import break_promises
 from .questions import (
     CONTACT,
@@ -19,6 +19,7 @@ from .questions import (
     DEPTH,
     DISTANCES,
     INTERSECTIONS,
+    MIXED,
     MOTION,
     POINTS,
     PROXIMITY,
@@ -34,12 +35,12 @@ from .steps import EARLY, contradict
 
 SIMD = ("scalar", "avx2", "avx512", "neon")
 QUESTIONS = (CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS, DISTANCES, STEP, MOTION)
-QUESTIONS += (CONTAINMENT, WINDING, SIGNED, TRANSLATION, DEPTH, POINTS)
+QUESTIONS += (CONTAINMENT, WINDING, SIGNED, TRANSLATION, DEPTH, POINTS, MIXED)
 
 # Guarantee of `exact`: error of the time; error of the distance, relative to the size of the query.
 TOLERANCE = 1e-12
 # Results that are times: `conservative` may report them too early but not too late.
-OF_A_STEP = (CONTACT, SEPARATION)
+OF_A_STEP = (CONTACT, SEPARATION, MIXED)
 
 Tallies = dict[tuple[str, str, str], "Tally"]  # by question, accuracy and kind
 
@@ -76,7 +77,7 @@ class Disagreement:
             return self.uneven
         broken = self.uneven | self.missed
         broken |= self.late > 0 if self.question in OF_A_STEP else np.abs(self.late) > TOLERANCE
-        if self.question != CONTACT:  # the same pairs as exact
+        if self.question not in (CONTACT, MIXED):  # the same pairs as exact
             broken |= self.invented
         return broken
 
@@ -134,9 +135,20 @@ def compare(batch: Batch, accuracy: str, simd: Sequence[str], truth: Results) ->
     (hit, value), *others = (questions.results(batch, accuracy, s) for s in simd)
     # A distance of meshes is told whether or not they touch; it is infinite where they have no pair of features.
     # A step is told where nothing touches too, and a smallest factor.
-    always = batch.question in (DISTANCES, CONTAINMENT, STEP, MOTION, WINDING, SIGNED, TRANSLATION, DEPTH, POINTS)
+    always = batch.question in (
+        DISTANCES,
+        CONTAINMENT,
+        STEP,
+        MOTION,
+        WINDING,
+        SIGNED,
+        TRANSLATION,
+        DEPTH,
+        POINTS,
+        MIXED,
+    )
     told = np.ones_like(hit) if always else hit
-    largest = 1.0 if batch.question in (CONTACT, SEPARATION, STEP, MOTION) else np.inf
+    largest = 1.0 if batch.question in (CONTACT, SEPARATION, STEP, MOTION, MIXED) else np.inf
     if not ((value[told] >= 0) & (value[told] <= largest)).all():
         raise AssertionError(f"{accuracy} {batch.question} {batch.kind}: value out of range: {value[told][:5]}")
     uneven = np.zeros(hit.shape, bool)
@@ -154,6 +166,8 @@ def compare(batch: Batch, accuracy: str, simd: Sequence[str], truth: Results) ->
     if batch.question == MOTION:  # the value is a factor, to which others than the true step may be right
         late[:] = np.nan
         uneven |= break_promises(batch.kind, batch.queries, batch.distances, accuracy, simd, true_value)
+    if batch.question == MIXED:
+        uneven |= mixed.break_promises(batch.kind, batch.queries, batch.distances, accuracy, simd)
     if batch.question == DEPTH:
         for s in simd:
             uneven |= solids.break_promises(batch.kind, batch.queries, accuracy, s, true_value)

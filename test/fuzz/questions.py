@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Queries to the core and the oracle: contact, separation, proximity and intersections of single pairs; distances,
 containment, collision-free steps, collision-free motions, winding numbers, separating translations and penetration of
-small scenes."""
+small scenes; all results of small scenes with planes, points, thickness and filters."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ from .containment import CONTAINMENT_KINDS, CONTAINMENT_POINTS, core_containment
 from .disturbances import disturb, disturb_near
 from .gaps import GAP_POINTS, TOPOLOGIES, core_gaps, true_gaps
 from .generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
+from .mixed import core_first, true_first
+from .mixed_scenes import MIXED_SCENES
 from .motions import FREE_MOTIONS, core_motions
 from .near_generators import NEAR_GENERATORS
 from .snapshots import EDGE_FACE, EDGE_FACE_POINTS, SNAPSHOTS
@@ -39,7 +41,7 @@ from .steps import STEP_MOTIONS, core_steps, true_steps
 CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS = "contact", "separation", "proximity", "intersections"
 DISTANCES, STEP, MOTION = "distances", "step", "motion"
 CONTAINMENT, WINDING, SIGNED = "containment", "winding", "signed-distance"
-TRANSLATION, DEPTH, POINTS = "translation", "depth", "points"
+TRANSLATION, DEPTH, POINTS, MIXED = "translation", "depth", "points", "mixed"
 # By question, their kinds.
 OF_SCENES = {
     DISTANCES: TOPOLOGIES,
@@ -48,6 +50,7 @@ OF_SCENES = {
     MOTION: FREE_MOTIONS,
     TRANSLATION: TRANSLATIONS,
     DEPTH: DEPTHS,
+    MIXED: MIXED_SCENES,
 }
 PAIRS_OF_A_SCENE = 10  # a batch has a tenth as many scenes as single pairs: each scene has dozens of pairs
 
@@ -99,6 +102,7 @@ def generators_of(question: str, kind: str) -> dict[str, Callable]:
         SIGNED: WINDING_POINTS,
         TRANSLATION: TRANSLATIONS,
         DEPTH: DEPTHS,
+        MIXED: MIXED_SCENES,
         POINTS: {EDGE_FACE: EDGE_FACE_POINTS},
     }[question][kind]
 
@@ -121,6 +125,8 @@ def truth(batch: Batch, threads: int = 0) -> Results:
         return true_gaps(batch.kind, batch.queries)
     if batch.question in (STEP, MOTION):
         return true_steps(batch.kind, batch.queries, batch.distances, threads)
+    if batch.question == MIXED:
+        return true_first(batch.kind, batch.queries)
     if batch.question == POINTS:
         return true_points(batch.queries, threads)
     if batch.question in OF_SOLIDS:
@@ -148,6 +154,8 @@ def results(batch: Batch, accuracy: str, simd: str) -> Results:
         return core_steps(batch.kind, batch.queries, batch.distances, accuracy, simd)
     if batch.question == MOTION:
         return core_motions(batch.kind, batch.queries, batch.distances, accuracy, simd)
+    if batch.question == MIXED:
+        return core_first(batch.kind, batch.queries, accuracy, simd)
     if batch.question == POINTS:
         return core_points(batch.queries, accuracy, simd)
     if batch.question in OF_SOLIDS:
