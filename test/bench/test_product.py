@@ -13,7 +13,7 @@ from sources import ROOT
 
 import hpccd_core as hc
 from hpccd_ros.bag.writer import BagWriter, Topic
-from hpccd_ros.bench import accuracy, sources
+from hpccd_ros.bench import accuracy, choice, sources
 from hpccd_ros.bench.report import Report, commit
 
 STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", "--repeat", "1")
@@ -113,6 +113,7 @@ def test_tiers(product):
 def test_a_broken_promise_fails(tier, change, failures):
     report = Report("accuracy", "hpccd bench accuracy", {})
     row = {"scene": "s", "accuracy": tier, "missed": 0, "invented": 0, "toc_worst": 0.0, "latest": 0.0}
+    row["detail"] = choice.FULL
     report.add(**row | change)
     accuracy.check(report)
     assert len(report.failures) == failures

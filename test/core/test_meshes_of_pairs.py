@@ -210,7 +210,7 @@ def test_sides_and_dicts_in_scenes_with_empty_meshes_points_and_ropes(seed):
         assert found == getattr(copied, query)(*by_mesh[: len(given)], *more)
         if query == "distances":
             continue
-        vf, ee, ef = found._pairs()
+        vf, ee, ef = (getattr(found, kind, ()) for kind in ("vf", "ee", "ef"))
         sides = [([vertices[v]], [faces[f]]) for v, f in vf]
         sides += [([vertices[v] for v in row[:2]], [vertices[v] for v in row[2:]]) for row in ee]
         sides += [([vertices[v] for v in row[:2]], [faces[row[2]]]) for row in ef]

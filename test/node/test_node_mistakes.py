@@ -40,7 +40,7 @@ REJECTED = {
     "invented-stop": (
         CLOTH | {"stop_now": True},
         "stop_now: no such parameter; those of the topics stop and speed_scale are stop_distance, stop_timeout, "
-        "approach_time, clock_error",
+        "approach_time, stop_detail, clock_error",
     ),
     "misspelt-accuracy": (CLOTH | {"acuracy": "exact"}, "did you mean accuracy?"),
     "capitals": (CLOTH | {"Accuracy": "exact"}, "did you mean accuracy?"),
@@ -55,8 +55,8 @@ REJECTED = {
     ),
     "key-of-a-mesh": (
         CLOTH | {"mesh.cloth.fil": "cloth.obj"},
-        "mesh.cloth.fil: no such parameter of a mesh; there are input, static, self_collision, file, transform, frame, "
-        "pose; did you mean file?",
+        "mesh.cloth.fil: no such parameter of a mesh; there are input, static, self_collision, ignored_rings, "
+        "ignored_at_rest, file, transform, frame, pose; did you mean file?",
     ),
     "name-of-a-mesh": (
         CLOTH | {"mesh.clot.static": True},
