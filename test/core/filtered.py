@@ -61,7 +61,7 @@ class Filters:
         return int(np.searchsorted(self.first_vertex, vertex, "right") - 1)
 
     def _reached(self, vertex, rings):
-        """Vertices joined to one by at most so many edges."""
+        """Vertices joined to one by at most this number of edges."""
         reached = {vertex}
         for _ in range(rings):
             reached |= {w for v in reached for w in self.joined[v]}
