@@ -3,6 +3,7 @@
 
 import dataclasses
 
+import cloth_and_net_stream
 import numpy as np
 import pytest
 from cloth_and_net import FACES, MESHES, N, frame, positions
@@ -23,21 +24,12 @@ from hpccd_ros.replay.recomputed import Replay
 FACES_ONLY, EDGES_ONLY = ("vertex_face",), ("edge_edge",)
 
 
-class Stream:
-    """Frames of both meshes, each processed before the next is sent. pairs: (mesh, mesh, features) of the node."""
+class Stream(cloth_and_net_stream.Stream):
+    """pairs: (mesh, mesh, features) of the node."""
 
     def __init__(self, node, pairs=()):
-        self.node, self.pairs, self.sent = node, pairs, 0
-        for name in MESHES:
-            node.peer.topology(name, FACES, N * N)
-        self.send()
-
-    def send(self):
-        for name, part in zip(MESHES, positions(self.sent), strict=True):
-            self.node.peer.vertices(name, part, stamp=self.sent, frame_id="world")
-        self.sent += 1
-        self.node.frames_status(processed=2 * self.sent)
-        return self.node.contacts(self.sent - 1)[-1] if self.sent > 1 else None
+        self.pairs = pairs
+        super().__init__(node)
 
     def expect(self, features):
         """Send a frame; its result is that of the core, and reports what was tested."""
