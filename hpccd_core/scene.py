@@ -154,8 +154,7 @@ class Scene:
 
         Notes
         -----
-        Scenes with points are computed on CPUs. Without a thickness or a separation two points touch only where they
-        coincide.
+        Without a thickness or a separation two points touch only where they coincide.
 
         Examples
         --------

@@ -262,6 +262,3 @@ def test_options_of_points():
     for options in ({"detail": 0.5}, {"results": "device"}):
         with pytest.raises(ValueError, match="detail|results"):
             hc.Detector(scene, **options)
-    if "gpu" in hc.backends():
-        with pytest.raises(ValueError, match="points"):
-            hc.Detector(scene, backend="gpu")

@@ -29,11 +29,8 @@ void require_device_for_results(const Options& o) {
 AvailableBackends::AvailableBackends(Resources& shared) : cpu_(shared) {
   const Options& o = shared.options;
   require_device_for_results(o);
-  const std::string points =
-      shared.features.edge_kinds.empty() ? "" : "backend: points are tested on CPUs only; use the CPU for this scene";
-  const std::string options = GpuBackend::unsupported(o);
-  if (wanted(Backend::gpu, "gpu", options.empty() ? points : options, o)) gpu_.emplace(shared);
-  if (wanted(Backend::hybrid, "hybrid", points, o)) hybrid_.emplace(shared, cpu_);
+  if (wanted(Backend::gpu, "gpu", GpuBackend::unsupported(o), o)) gpu_.emplace(shared);
+  if (wanted(Backend::hybrid, "hybrid", "", o)) hybrid_.emplace(shared, cpu_);
   if (o.worlds == 1) return;
   memories_.emplace(o.worlds);
   worlds_on_cpus_.emplace(shared, cpu_, *memories_);

@@ -97,15 +97,24 @@ __device__ double extent_of(const T* from, const T* to) {
   return length;
 }
 
-// scene/edge_sample.h, one block per world: the edge with the right number of shorter ones decides.
+// scene/edge_sample.h, one block per world: the edge with the right number of shorter ones decides. Points are no
+// edges.
 template <class T>
 __global__ void floats_suffice_kernel(LaunchParams<T> params) {
   __shared__ double lengths[2 * edges_of_a_step];
+  __shared__ u32 n_edges;
+  if (threadIdx.x == 0) n_edges = 0;
+  __syncthreads();
   const EdgeSample sample = EdgeSample::of(params.n_edges, edges_of_a_step);
   const u64 base = static_cast<u64>(blockIdx.x) * params.n_vertices;
   WorldCounters& world = params.worlds[blockIdx.x];
   for (std::size_t i = threadIdx.x; i < sample.count; i += blockDim.x) {
     const uint2 edge = params.edges[i * sample.stride];
+    if (edge.x == edge.y) {
+      lengths[i] = INFINITY;
+      continue;
+    }
+    atomicAdd(&n_edges, 1u);
     const u64 a = 3 * (base + edge.x), b = 3 * (base + edge.y);
     lengths[i] =
         fmin(extent_of(params.given_t0 + a, params.given_t0 + b), extent_of(params.given_t1 + a, params.given_t1 + b));
@@ -115,7 +124,8 @@ __global__ void floats_suffice_kernel(LaunchParams<T> params) {
     std::size_t below = 0;
     for (std::size_t j = 0; j < sample.count; ++j)
       below += lengths[j] < lengths[i] || (lengths[j] == lengths[i] && j < i);
-    if (below != sample.short_one() || !floats_suffice(lengths[i], SceneExtent(world).map().scale)) continue;
+    if (below != EdgeSample{sample.stride, n_edges}.short_one() || lengths[i] == INFINITY) continue;
+    if (!floats_suffice(lengths[i], SceneExtent(world).map().scale)) continue;
     world.floats_suffice = 1;
     atomicAdd(&params.counters->floats_suffice, u64{1});
   }

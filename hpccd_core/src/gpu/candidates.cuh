@@ -102,14 +102,19 @@ struct LanePair {
   uint2 features;
 };
 
-// Drops a pair that a filter ignores. Intersections: an edge and a face.
+// Drops a pair that is never tested, or that a filter ignores. Intersections: an edge and a face.
 template <Query query, class T>
 __device__ __forceinline__ void drop_ignored(const LaunchParams<T>& params, CandidateState& state, LanePair& pair,
                                              u32 world) {
   if (!pair.wanted) return;
   const bool edges = pair.features.y & kind_bit;
   const uint2 features{pair.features.x, pair.features.y & ~kind_bit};
-  if (!is_ignored<query == Query::intersections>(params, features, edges, world)) return;
+  constexpr bool edge_and_face = query == Query::intersections;
+  if (is_never_tested<edge_and_face>(params, features, edges, world)) {
+    pair.wanted = false;
+    return;
+  }
+  if (!is_ignored<edge_and_face>(params, features, edges, world)) return;
   pair.wanted = false;
   ++(edges ? state.ignored[1] : state.ignored[0]);
 }

@@ -34,6 +34,7 @@ class DeviceScene {
     upload_rules(scene, accuracy);
     upload_tested(scene, tested);
     upload_filter(scene, filter);
+    if (with_points()) upload(edge_kinds_, features.edge_kinds.data(), n_edges);
     keys_ = PairKeys::of(features.n_vertices, n_edges, features.n_faces(), n_worlds);
   }
 
@@ -52,6 +53,7 @@ class DeviceScene {
     params.default_accuracy = default_accuracy_;
     params.features = one_tested_ ? nullptr : tested_.data();
     params.default_features = default_tested_;
+    params.edge_kinds = edge_kinds_.size() ? edge_kinds_.data() : nullptr;
     params.filtered = filtered_.size() ? filtered_.data() : nullptr;
     if (params.filtered) {
       const auto rows = [&](std::size_t table) {
@@ -111,9 +113,9 @@ class DeviceScene {
   std::size_t bytes() const {
     std::size_t of_filter = filtered_.bytes();
     for (std::size_t i = 0; i < FeatureFilter::n_tables; ++i) of_filter += first_[i].bytes() + values_[i].bytes();
-    return of_filter + edges_.bytes() + faces_.bytes() + mesh_of_vertex_.bytes() + enabled_.bytes() +
-           accuracy_.bytes() + tested_.bytes() + pair_separation_.bytes() + largest_separation_.bytes() +
-           vertex_thickness_.bytes() + edge_thickness_.bytes() + face_thickness_.bytes();
+    return of_filter + edge_kinds_.bytes() + edges_.bytes() + faces_.bytes() + mesh_of_vertex_.bytes() +
+           enabled_.bytes() + accuracy_.bytes() + tested_.bytes() + pair_separation_.bytes() +
+           largest_separation_.bytes() + vertex_thickness_.bytes() + edge_thickness_.bytes() + face_thickness_.bytes();
   }
 
  private:
@@ -167,14 +169,24 @@ class DeviceScene {
     default_tested_ = bits(otherwise);
     for (const auto& [pair, features] : ScenePairs(scene).features())
       one_tested_ = one_tested_ && features == otherwise;
-    if (!one_tested_)
-      upload_pairs(tested_, of_all_pairs<unsigned char>(
-                                [&](u32 a, u32 b) { return bits(scene.pair_features(a, b, otherwise)); }));
+    one_tested_ = one_tested_ && !with_points();
+    if (one_tested_) return;
+    upload_pairs(tested_, of_all_pairs<unsigned char>([&](u32 a, u32 b) {
+                   TestedFeatures f = scene.pair_features(a, b, otherwise);
+                   if (with_points() && all_never_paired(kinds_of_edges(a), kinds_of_edges(b))) f.edge_edge = false;
+                   return bits(f);
+                 }));
   }
 
+  bool with_points() const { return !features_.edge_kinds.empty(); }
+  unsigned kinds_of_edges(u32 mesh) const { return features_.edge_kinds_of_mesh[mesh]; }
+
   void upload_filter(const Scene& scene, const FeatureFilter& filter) {
-    if (!filter.any()) return;
+    if (!filter.any() && !with_points()) return;
     std::vector<unsigned char> filtered(std::size_t{n_meshes_} * n_meshes_, false);
+    if (with_points())
+      filtered = of_all_pairs<unsigned char>(
+          [&](u32 a, u32 b) { return some_never_paired(kinds_of_edges(a), kinds_of_edges(b)); });
     for (const auto& [a, b] : filtered_pairs(scene))
       filtered[std::size_t{a} * n_meshes_ + b] = filtered[std::size_t{b} * n_meshes_ + a] = true;
     upload_pairs(filtered_, filtered);
@@ -198,6 +210,7 @@ class DeviceScene {
   DeviceBuffer<u32> faces_, mesh_of_vertex_;
   DeviceBuffer<unsigned char> enabled_, accuracy_, tested_;
   DeviceBuffer<unsigned char> filtered_;
+  DeviceBuffer<EdgeKind> edge_kinds_;
   DeviceBuffer<u32> first_[FeatureFilter::n_tables], values_[FeatureFilter::n_tables];
   DeviceBuffer<double> pair_separation_, largest_separation_;
   DeviceBuffer<double> vertex_thickness_, edge_thickness_, face_thickness_;

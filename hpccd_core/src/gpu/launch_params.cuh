@@ -12,6 +12,7 @@
 #include "gpu/pair_keys.h"
 #include "gpu/warp.cuh"
 #include "hpccd/hpccd.h"
+#include "scene/features.h"
 #include "scene/filter_view.h"
 
 namespace hpccd::gpu {
@@ -91,7 +92,8 @@ struct LaunchParams {
   const unsigned char* features;  // n_meshes^2, tests_vertex_face and tests_edge_edge; null: the default
   unsigned char default_features;
   FilterView filter;              // in the numbers of one world
-  const unsigned char* filtered;  // n_meshes^2: whether some of their features are ignored; null: no pairs of meshes
+  const EdgeKind* edge_kinds;     // of edges; null if there are no points
+  const unsigned char* filtered;  // n_meshes^2: whether some of their pairs are dropped; null: no pairs of meshes
   PairKeys keys;
   // The minimum separation, or the distance of a proximity query.
   double separation;                 // if there is no table
@@ -182,15 +184,24 @@ __device__ inline u32 tested_features(const LaunchParams<T>& params, const Devic
   return params.features[mesh(a) * params.n_meshes + mesh(b)];
 }
 
-// Whether some features of two leaves may be ignored.
+// Whether some pairs of features of two leaves may be ignored or never tested.
 template <class T>
 __device__ inline bool are_filtered(const LaunchParams<T>& params, const DeviceLeaf& a, const DeviceLeaf& b) {
   const auto mesh = [&](const DeviceLeaf& l) { return params.mesh_of_vertex[params.corners[l.first_corner]]; };
   return params.filtered[mesh(a) * params.n_meshes + mesh(b)];
 }
 
-// Whether a pair is ignored: edge and face, or two edges, or vertex and face. The first feature is numbered through all
-// worlds.
+// Whether a pair is never tested because it has a point: edge and face, or two edges. The first feature is numbered
+// through all worlds.
+template <bool edge_and_face, class T>
+__device__ inline bool is_never_tested(const LaunchParams<T>& params, uint2 pair, bool edges, u32 world) {
+  if (!params.edge_kinds) return false;
+  const auto kind = [&](u32 e) { return params.edge_kinds[e]; };
+  if constexpr (edge_and_face) return kind(pair.x - world * params.n_edges) == EdgeKind::point;
+  return edges && never_paired(kind(pair.x - world * params.n_edges), kind(pair.y));
+}
+
+// Whether a pair is ignored: edge and face, or two edges, or vertex and face. Numbers as above.
 template <bool edge_and_face, class T>
 __device__ inline bool is_ignored(const LaunchParams<T>& params, uint2 pair, bool edges, u32 world) {
   if constexpr (edge_and_face) return params.filter.edge_face(pair.x - world * params.n_edges, pair.y);

@@ -86,7 +86,7 @@ __device__ __forceinline__ bool is_near(const NearLeaves& s, u32 first, u32 seco
   return apart && overlap(s.first.box(first), s.second.box(second));
 }
 
-// drops: a filter may ignore pairs.
+// drops: some pairs may be ignored or never tested.
 template <bool filtered, class T>
 __device__ __forceinline__ void keep_near_pairs(const LaunchParams<T>& params, NearLeaves& s, NearState& state,
                                                 const NearCounts& a, const NearCounts& b, u32 world, bool same,
@@ -109,11 +109,14 @@ __device__ __forceinline__ void keep_near_pairs(const LaunchParams<T>& params, N
     }
     uint2 features{0, 0};
     if (near) near = is_near(s, s.near[of.first + pair.x], of.second + pair.y, first_edge, edges, face_first, features);
-    if constexpr (filtered)
-      if (drops && near && is_ignored<false>(params, {features.x, features.y & ~kind_bit}, edges, world)) {
+    if constexpr (filtered) {
+      const uint2 numbers{features.x, features.y & ~kind_bit};
+      if (drops && near) near = !is_never_tested<false>(params, numbers, edges, world);
+      if (drops && near && is_ignored<false>(params, numbers, edges, world)) {
         near = false;
         ++(edges ? state.ignored[1] : state.ignored[0]);
       }
+    }
     const u32 mask = __ballot_sync(all_lanes, near);
     if (near) s.waiting[state.n + __popc(mask & ((1u << lane_number()) - 1))] = features;
     state.n += __popc(mask);

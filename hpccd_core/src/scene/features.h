@@ -15,7 +15,13 @@ namespace hpccd {
 // What an edge is part of. The edge from a point to itself and an edge of a face are never paired: the point is tested
 // against the face.
 enum class EdgeKind : unsigned char { lone, of_face, point = 3 };
-inline bool never_paired(EdgeKind a, EdgeKind b) { return (static_cast<unsigned>(a) ^ static_cast<unsigned>(b)) == 2; }
+constexpr bool never_paired(EdgeKind a, EdgeKind b) {
+  return (static_cast<unsigned>(a) ^ static_cast<unsigned>(b)) == 2;
+}
+// By the kinds of edges of two meshes (Features::edge_kinds_of_mesh): whether no edges are paired, and whether some are
+// not.
+constexpr bool all_never_paired(unsigned a, unsigned b) { return (a == 2 && b == 8) || (a == 8 && b == 2); }
+constexpr bool some_never_paired(unsigned a, unsigned b) { return (a & 2 && b & 8) || (a & 8 && b & 2); }
 
 struct Features {
   // v0 < v1, and v0 = v1 for points; in lexicographic order: an edge's number is its rank.

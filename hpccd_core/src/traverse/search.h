@@ -85,8 +85,7 @@ struct Search {
   TestedFeatures tested(const Rule& rule, std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     TestedFeatures features = rule.features;
     if (!edge_kinds_of_mesh || mesh_a == mixed_meshes || mesh_b == mixed_meshes) return features;
-    const unsigned a = edge_kinds_of_mesh[mesh_a], b = edge_kinds_of_mesh[mesh_b];
-    if ((a == 2 && b == 8) || (a == 8 && b == 2)) features.edge_edge = false;
+    if (all_never_paired(edge_kinds_of_mesh[mesh_a], edge_kinds_of_mesh[mesh_b])) features.edge_edge = false;
     return features;
   }
 };
