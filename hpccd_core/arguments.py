@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 REALS = frozenset({np.dtype(np.float32), np.dtype(np.float64)})  # in this machine's byte order
 LARGEST_COORDINATE = 1e150  # largest_coordinate in src/base/coordinate_limits.h
+LARGEST_IN_SNAPSHOT = 1e300  # largest_in_snapshot there
 DEEPEST = 8  # levels of nested lists: arguments have at most three dimensions, and a list may contain itself
 
 #: Words that may be meant for a choice, beside misspellings of it.
@@ -146,6 +147,9 @@ def thickness(value: object) -> NDArray[np.float64]:
     bad = np.flatnonzero(~(np.isfinite(numbers) & (numbers >= 0)))
     if bad.size:
         raise ValueError(f"thickness[{bad[0]}]: must be finite and not negative, got {numbers[bad[0]]}")
+    bad = np.flatnonzero(numbers > LARGEST_IN_SNAPSHOT)
+    if bad.size:
+        raise ValueError(f"thickness[{bad[0]}]: must be at most {LARGEST_IN_SNAPSHOT:g}; choose a larger unit")
     return numbers
 
 
@@ -239,11 +243,11 @@ def edges(value: object) -> NDArray[np.uint32]:
 
 
 def index_rows(name: str, value: object, columns: int) -> NDArray[np.uint32]:
-    """(N, columns) integers -> uint32, C-contiguous."""
-    return _indices(name, value, "N", columns)
+    """(N, columns) integers, scene-wide numbers as in results -> uint32, C-contiguous."""
+    return _indices(name, value, "N", columns, "give scene-wide numbers, as in results")
 
 
-def _indices(name: str, value: object, rows: str, columns: int) -> NDArray[np.uint32]:
+def _indices(name: str, value: object, rows: str, columns: int, scene_wide: str = "") -> NDArray[np.uint32]:
     array = _array(name, value)
     if array.size == 0 and array.ndim in (1, 2):
         return np.empty((0, columns), np.uint32)
@@ -259,14 +263,14 @@ def _indices(name: str, value: object, rows: str, columns: int) -> NDArray[np.ui
             )
         raise TypeError(f"{name}: expected integers, got {_kind(value, array)}; {remedy}")
     if array.ndim != 2 or array.shape[1] != columns:
-        remedy = _remedy_for_indices(name, array, columns)
+        remedy = f"; {scene_wide}" if scene_wide else _remedy_for_indices(name, array, columns)
         raise ValueError(f"{name}: expected shape ({rows}, {columns}), got {array.shape}{remedy}")
     for bad, what in ((integers < 0, "is negative"), (integers > 0xFFFFFFFE, "is beyond 2**32 - 2")):
         if bad.any():
             row, column = np.argwhere(bad)[0]
             raise ValueError(
                 f"{name}[{row}, {column}] is {shown(integers[row, column])}, which {what}; "
-                "indices count this mesh's vertices from 0"
+                + (scene_wide or "indices count this mesh's vertices from 0")
             )
     return np.ascontiguousarray(integers, np.uint32)
 

@@ -451,6 +451,10 @@ class Detector(
         The plane does not move during a step: for one that moves, give the place that leaves less room.
         """
         number = arguments.mesh_number("plane", plane, self._mesh_numbers)
+        if number not in self._layout.planes:
+            planes = ", ".join(self._layout.mesh_names[k] for k in self._layout.planes) or "none"
+            name = self._layout.mesh_names[number]
+            raise ValueError(f"plane: {name!r} is a mesh, not a plane; the scene's planes are {planes}")
         self._core.set_plane(number, arguments.vector("normal", normal), arguments.real("offset", offset))
 
     @property
@@ -528,8 +532,9 @@ _OTHER_NAMES = {
     **{name: f"write outputs=({name!r},)" for name in ALL_OUTPUTS},
     **{name: f"write outputs=({output!r},)" for name, output in arguments.ALIASES.items()},
     **dict.fromkeys(("gradients", "toc_gradients"), "write outputs=('normals', 'weights')"),
+    "thickness": "write minimum_separation= for all meshes, or give each its own as Scene.add_mesh(..., thickness=)",
     **dict.fromkeys(
-        ("d_hat", "dhat", "xi", "thickness", "margin", "min_distance"),
+        ("d_hat", "dhat", "xi", "margin", "min_distance"),
         "write minimum_separation= for a thickness that no step violates, and call proximity(vertices, distance) for "
         "the pairs within a distance such as d-hat",
     ),

@@ -331,7 +331,7 @@ class Scene:
         >>> len(hc.Detector(scene).proximity(vertices, 0.6).vf)
         0
         """
-        number = self._number("mesh", mesh)
+        number = self._number_of_mesh("mesh", mesh)
         if rings is not None and rest_vertices is None and distance is None:
             self._repeat("ignore_rings", (number, arguments.whole_number("rings", rings, 0, _MOST)))
             return
@@ -370,7 +370,7 @@ class Scene:
         >>> _ = scene.add_mesh("robot", [[0, 1, 2]])
         >>> scene.ignore_faces("cloth", [0, 1], "robot")  # where the robot holds it
         """
-        pair = self._number("mesh", mesh), self._number("other", other)
+        pair = self._number_of_mesh("mesh", mesh), self._number("other", other)
         numbers = arguments.integers("faces", faces)
         if numbers.size == 0:
             numbers = np.empty(0, np.uint32)
@@ -474,6 +474,13 @@ class Scene:
 
     def _number(self, name: str, mesh: MeshName) -> int:
         return arguments.mesh_number(name, mesh, self._ids)
+
+    def _number_of_mesh(self, name: str, mesh: MeshName) -> int:
+        number = self._number(name, mesh)
+        if number in self.layout.planes:
+            plane = self.mesh_names[number]
+            raise ValueError(f"{name}: {plane!r} is a plane, which has no faces; use ignore_pair")
+        return number
 
     @property
     def n_vertices(self) -> int:

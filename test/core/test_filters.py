@@ -5,6 +5,7 @@ import copy
 import itertools
 import math
 import pickle
+import time
 
 import filtered
 import numpy as np
@@ -264,6 +265,29 @@ def test_worlds():
     assert [many.world(k).hash for k in range(3)] == [alone.hash] * 3
 
 
+@pytest.mark.parametrize("threads", [1, 2])
+def test_more_rings_than_the_mesh_has(threads):
+    n = 3000
+    scene = hc.Scene()
+    scene.add_mesh("rope", edges=np.stack([np.arange(n - 1), np.arange(1, n)], axis=1))
+    scene.add_points("single", 1)
+    scene.ignore_within("rope", rings=10**9)
+    scene.ignore_within("single", rings=10**9)
+    start = time.process_time()
+    detector = hc.Detector(scene, threads=threads)
+    assert time.process_time() - start < 5  # 18 s as long as each ring was merged with those before
+    assert len(detector.proximity(np.zeros((n + 1, 3)), 1.0)) == n - 1  # of the point and the rope
+
+
+def test_too_many_rings_are_rejected_at_once():
+    n = 100_000
+    scene = hc.Scene()
+    scene.add_mesh("rope", edges=np.stack([np.arange(n - 1), np.arange(1, n)], axis=1))
+    scene.ignore_within("rope", rings=10**9)
+    with pytest.raises(ValueError, match=r"rings: ignores 2\^32 pairs or more; give fewer rings"):
+        hc.Detector(scene, threads=1)
+
+
 def test_copies_and_pickles():
     meshes, motion, filters = of(random_scenes.many_meshes, 10)
     scene = filters.apply(meshes.scene())
@@ -293,11 +317,17 @@ def test_copies_and_pickles():
         (lambda s: s.ignore_features(ee=[[0, 1, 2, 9]]), r"ee\[0, 3\] is 9, but the scene has 9 vertices"),
         (lambda s: s.ignore_features(ef=[[0, 1]]), r"ef: expected shape \(N, 3\)"),
         (lambda s: (s.ignore_features(ee=[[0, 1, 0, 8]]), hc.Detector(s)), r"ee\[0\]: the vertices 0 and 8 are not"),
+        (lambda s: s.ignore_features(vf=[[-1, 0]]), r"vf\[0, 0\] is -1, which is negative; give scene-wide numbers"),
+        (lambda s: s.ignore_features(vf=[[0, 1, 2]]), r"vf: expected shape \(N, 2\).*give scene-wide numbers"),
+        (lambda s: s.ignore_within("floor", rings=1), "mesh: 'floor' is a plane, .*; use ignore_pair"),
+        (lambda s: s.ignore_within("floor", rest_vertices=np.empty((0, 3)), distance=1), "mesh: 'floor' is a plane"),
+        (lambda s: s.ignore_faces("floor", [], "cloth"), "mesh: 'floor' is a plane, .*; use ignore_pair"),
         (lambda s: (s.ignore_features(ef=[[0, 8, 0]]), hc.Detector(s)), r"ef\[0\]: the vertices 0 and 8 are not"),
     ],
 )
 def test_invalid_arguments_are_rejected(call, message):
     scene = hc.Scene()
     scene.add_mesh("cloth", hc.shapes.grid(2, 2)[1])
+    scene.add_plane("floor")
     with pytest.raises((TypeError, ValueError), match=message):
         call(scene)

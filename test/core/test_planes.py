@@ -400,6 +400,9 @@ def test_arguments_of_planes():
         with pytest.raises(ValueError, match="name|normal|offset"):
             scene.add_plane(*arguments)
     assert scene.mesh_names == ["floor"]
+    scene.add_mesh("cloth", [], n_vertices=0)
+    with pytest.raises(ValueError, match="plane: 'cloth' is a mesh, not a plane; the scene's planes are floor"):
+        hc.Detector(scene).set_plane("cloth", (0, 0, 1))
     assert hc.Detector(scene).detect(np.empty((0, 3)), np.empty((0, 3))).vp.shape == (0, 2)
 
 

@@ -258,11 +258,25 @@ def detector_faces(meshes):
     return [tuple(face + first) for faces, first in zip(meshes.faces, firsts, strict=True) for face in faces]
 
 
+def test_greatest_thickness():
+    vertices, faces = hc.shapes.grid(2, 2)
+    scene = hc.Scene()
+    for mesh in "ab":
+        scene.add_mesh(mesh, faces, thickness=1e300, self_collision=False)
+    both = np.concatenate([vertices, vertices + [0, 0, 1]])
+    detector = hc.Detector(scene)
+    (gap,) = detector.distances(both)
+    assert (gap.distance, gap.kind) == (-2e300, "vertex-face")
+    assert detector.proximity(both, 0.0).vf_distance.tolist() == [-2e300] * (2 * len(vertices) * len(faces))
+    assert detector.detect(both, both).first_toc == 0
+
+
 @pytest.mark.parametrize(
     ("thickness", "error", "words"),
     [
         (-1.0, ValueError, "thickness.0.: must be finite and not negative"),
         ([0.1, float("nan")], ValueError, "thickness.1.: must be finite"),
+        ([0.1, 1e301], ValueError, "thickness.1.: must be at most 1e.300; choose a larger unit"),
         ([0.1, 0.1, 0.1], ValueError, "one number or 2, one for each face, got 3"),
         ([[0.1]], ValueError, "shape"),
         ("0.1", TypeError, "thickness"),

@@ -2,6 +2,7 @@
 #include "scene/feature_filter.h"
 
 #include <algorithm>
+#include <atomic>
 #include <iterator>
 #include <numeric>
 #include <span>
@@ -16,9 +17,11 @@ namespace {
 using Pairs = std::vector<std::array<std::uint32_t, 2>>;
 using Rows = FeatureFilter::Rows;
 
-void require_room(std::size_t n, const char* name) {
+void require_room(std::uint64_t n, const char* name) {
   if (n > UINT32_MAX)
-    throw InvalidArgument(std::string(name) + ": ignores 2^32 pairs or more; give fewer rings or a smaller distance");
+    throw InvalidArgument(
+        std::string(name) +
+        ": ignores 2^32 pairs or more; give fewer rings or a smaller distance, or add the mesh without self-collision");
 }
 
 // The number of each row to the position at which it begins.
@@ -39,7 +42,8 @@ Rows rows_of(Pairs pairs, std::size_t n_rows, const char* name) {
 // The vertices at the other end of the edges of each vertex.
 class Neighbours {
  public:
-  explicit Neighbours(const Features& x) : first_(x.n_vertices + std::size_t{2}, 0), other_(2 * x.edges.size()) {
+  explicit Neighbours(const Features& x)
+      : n_(x.n_vertices), first_(x.n_vertices + std::size_t{2}, 0), other_(2 * x.edges.size()) {
     for (const auto& edge : x.edges)
       for (const std::uint32_t v : edge) ++first_[v + std::size_t{2}];
     std::partial_sum(first_.begin(), first_.end(), first_.begin());
@@ -48,11 +52,53 @@ class Neighbours {
   std::span<const std::uint32_t> of(std::uint32_t v) const {
     return std::span(other_).subspan(first_[v], first_[v + 1] - first_[v]);
   }
+  std::size_t n() const { return n_; }
 
  private:
+  std::size_t n_;
   std::vector<std::size_t> first_;
   std::vector<std::uint32_t> other_;
 };
+
+// Vertices within some edges of another.
+class Ball {
+ public:
+  // Those of v by distance, v first, which are valid until the next call.
+  std::vector<std::uint32_t>& around(std::uint32_t v, std::uint32_t rings, const Neighbours& neighbours) {
+    if (last_.empty()) last_.assign(neighbours.n(), UINT32_MAX);
+    reached_.assign(1, v), last_[v] = v;
+    rings_ = 0;
+    for (std::size_t from = 0; rings_ < rings && from < reached_.size(); ++rings_)
+      for (const std::size_t end = reached_.size(); from < end; ++from)
+        for (const std::uint32_t w : neighbours.of(reached_[from]))
+          if (last_[w] != v) last_[w] = v, reached_.push_back(w);
+    return reached_;
+  }
+  // At least the number of rings that the last ones lie in.
+  std::uint32_t rings() const { return rings_; }
+
+ private:
+  std::vector<std::uint32_t> last_;  // by vertex: around which it was reached last
+  std::vector<std::uint32_t> reached_;
+  std::uint32_t rings_ = 0;
+};
+
+// The number of pairs in components whose vertices are all within the rings of each other: known before they are
+// listed, which would take hours and all memory.
+std::uint64_t pairs_of_whole_components(const Features& x, const std::vector<std::uint32_t>& rings,
+                                        const Neighbours& neighbours) {
+  Ball ball;
+  std::vector<char> seen(x.n_vertices);
+  std::uint64_t n = 0;
+  for (std::uint32_t v = 0; v < x.n_vertices; ++v) {
+    const std::uint32_t most = rings[x.mesh_of_vertex[v]];
+    if (most == 0 || seen[v]) continue;
+    const std::vector<std::uint32_t>& component = ball.around(v, UINT32_MAX, neighbours);
+    for (const std::uint32_t w : component) seen[w] = true;
+    if (2 * std::uint64_t{ball.rings()} <= most) n += std::uint64_t{component.size()} * (component.size() - 1) / 2;
+  }
+  return n;
+}
 
 // By breadth-first search from each vertex. Only vertices with higher numbers are kept: half of the memory.
 Rows rows_of_rings(const Scene& scene, const Features& x, ThreadPool& pool) {
@@ -61,33 +107,26 @@ Rows rows_of_rings(const Scene& scene, const Features& x, ThreadPool& pool) {
     if (scene.pair_enabled(mesh, mesh)) rings[mesh] = n;
   if (std::ranges::count(rings, 0u) == std::ssize(rings)) return {};
   const Neighbours neighbours(x);
+  require_room(pairs_of_whole_components(x, rings, neighbours), "rings");
   constexpr std::size_t piece = 1024;
   std::vector<std::vector<std::uint32_t>> found((x.n_vertices + piece - 1) / piece);
+  std::vector<Ball> balls(static_cast<std::size_t>(pool.size()));
+  std::atomic<std::uint64_t> n{0};
   Rows rows;
   rows.first.assign(x.n_vertices + std::size_t{1}, 0);
-  parallel_for(pool, x.n_vertices, piece, [&](std::size_t begin, std::size_t end, int) {
-    std::vector<std::uint32_t> reached, last, next, all;  // ascending
+  parallel_for(pool, x.n_vertices, piece, [&](std::size_t begin, std::size_t end, int thread) {
     std::vector<std::uint32_t>& values = found[begin / piece];
     for (auto v = static_cast<std::uint32_t>(begin); v < end; ++v) {
-      reached.assign(1, v), last = reached;
-      for (std::uint32_t ring = 0; ring < rings[x.mesh_of_vertex[v]] && !last.empty(); ++ring) {
-        next.clear(), all.clear();
-        for (const std::uint32_t w : last) next.insert(next.end(), neighbours.of(w).begin(), neighbours.of(w).end());
-        std::ranges::sort(next);
-        next.erase(std::unique(next.begin(), next.end()), next.end());
-        last.clear();
-        std::ranges::set_difference(next, reached, std::back_inserter(last));
-        std::ranges::merge(reached, last, std::back_inserter(all));
-        reached.swap(all);
-      }
-      const auto after = std::ranges::upper_bound(reached, v);
-      rows.first[v + std::size_t{1}] = static_cast<std::uint32_t>(reached.end() - after);
-      values.insert(values.end(), after, reached.end());
+      const std::uint32_t most = rings[x.mesh_of_vertex[v]];
+      if (most == 0) continue;
+      auto& near = balls[static_cast<std::size_t>(thread)].around(v, most, neighbours);
+      std::erase_if(near, [&](std::uint32_t w) { return w <= v; });
+      std::ranges::sort(near);
+      require_room(n += near.size(), "rings");
+      rows.first[v + std::size_t{1}] = static_cast<std::uint32_t>(near.size());
+      values.insert(values.end(), near.begin(), near.end());
     }
   });
-  std::size_t n = 0;
-  for (const auto& values : found) n += values.size();
-  require_room(n, "rings");
   sum_up(rows.first);
   rows.values.reserve(n);
   for (auto& values : found) rows.values.insert(rows.values.end(), values.begin(), values.end()), values = {};

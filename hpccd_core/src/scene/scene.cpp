@@ -54,6 +54,11 @@ void append(std::vector<std::array<std::uint32_t, corners>>& all,
   if (larger.capacity() > 0) all.swap(larger);
 }
 
+// For filters of features.
+void require_no_plane(const Scene::Mesh& mesh) {
+  if (mesh.plane) throw InvalidArgument("mesh: '" + mesh.name + "' is a plane, which has no faces; use ignore_pair()");
+}
+
 }  // namespace
 
 std::uint32_t Scene::add_mesh(std::string name, std::span<const std::uint32_t> faces, std::uint32_t n_vertices,
@@ -129,13 +134,15 @@ void Scene::set_features(std::uint32_t mesh_a, std::uint32_t mesh_b, TestedFeatu
 }
 
 void Scene::ignore_within(std::uint32_t mesh, std::uint32_t rings) {
-  std::uint32_t& most = rings_[known(mesh, mesh).first];
+  require_no_plane(meshes_[known(mesh, mesh).first]);
+  std::uint32_t& most = rings_[mesh];
   most = std::max(most, rings);
 }
 
 void Scene::ignore_within(std::uint32_t mesh, RestFilter rest) {
   const StandardArithmetic arithmetic;
   const Mesh& m = meshes_[known(mesh, mesh).first];
+  require_no_plane(m);
   if (rest.vertices.size() != 3 * std::size_t{m.n_vertices})
     throw InvalidArgument("rest_vertices: mesh '" + m.name + "' has " + std::to_string(m.n_vertices) +
                           " vertices, but " + std::to_string(rest.vertices.size()) +
@@ -150,7 +157,7 @@ void Scene::ignore_within(std::uint32_t mesh, RestFilter rest) {
 }
 
 void Scene::ignore_faces(std::uint32_t mesh, std::span<const std::uint32_t> faces, std::uint32_t other) {
-  known(mesh, other);
+  known(mesh, other), require_no_plane(meshes_[mesh]);
   for (std::size_t i = 0; i < faces.size(); ++i)
     if (faces[i] >= meshes_[mesh].n_faces)
       throw InvalidArgument("faces[" + std::to_string(i) + "] is " + std::to_string(faces[i]) + ", but mesh '" +

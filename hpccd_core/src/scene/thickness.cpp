@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <string>
 
+#include "base/coordinate_limits.h"
 #include "base/length.h"
 
 namespace hpccd {
@@ -30,7 +31,11 @@ void check_thickness(const Scene::Mesh& mesh, std::span<const double> values) {
   if (values.size() != 1 && values.size() != elements.n)
     throw InvalidArgument("thickness: '" + mesh.name + "' needs one value, or one for each " + elements.name + " (" +
                           std::to_string(elements.n) + "), but " + std::to_string(values.size()) + " were given");
-  for (const double t : values) check_length("thickness", t);
+  for (const double t : values) {
+    check_length("thickness", t);
+    // The sum of two must be finite: distances of surfaces are less it.
+    if (t > largest_in_snapshot) throw InvalidArgument("thickness: must be at most 1e300; choose a larger unit");
+  }
 }
 
 ThicknessTable::ThicknessTable(const Scene& scene, const Features& features)
@@ -49,9 +54,8 @@ void ThicknessTable::set(std::uint32_t number, std::span<const double> values) {
   const double largest = *std::ranges::max_element(values);
   if (given.empty() && !(largest > 0)) return;
   if (of_face_.empty() && of_vertex_.empty() && of_edge_.empty()) {
-    of_face_.resize(features_.n_faces());
-    of_edge_.resize(features_.edges.size());
-    of_vertex_.resize(features_.n_vertices);
+    std::vector<double> of_vertex(features_.n_vertices), of_edge(features_.edges.size()), of_face(features_.n_faces());
+    of_vertex_.swap(of_vertex), of_edge_.swap(of_edge), of_face_.swap(of_face);  // all or, without memory, none
   }
   const Scene::Mesh& mesh = scene_.meshes()[number];
   const bool each = values.size() > 1;
