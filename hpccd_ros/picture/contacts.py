@@ -54,6 +54,7 @@ class Picture:
     contours: Sequence[hc.Contour] = ()  # along which meshes intersect
     depths: Sequence[Depth] = ()
     unit: float = 1.0  # the length of the unit of the positions
+    planes: int = 0  # how many of the meshes, the last ones, are patches of planes
 
 
 @dataclasses.dataclass
@@ -84,7 +85,9 @@ def compose(picture: Picture, history: History | None = None, *, azimuth=-60.0, 
     """The picture as a matplotlib figure; size: of its scene, pixels."""
     picture = _of_drawable_size(picture)
     contacts = (picture.points, picture.toc)
-    image, camera, depth = render(picture.meshes, size, azimuth, elevation, contacts, picture.intersecting)
+    image, camera, depth = render(
+        picture.meshes, size, azimuth, elevation, contacts, picture.intersecting, planes=picture.planes
+    )
     figure = Figure(figsize=(16, 9), dpi=120, facecolor=BACKGROUND)
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.13, 0.80, 0.735))
@@ -113,11 +116,12 @@ def _of_drawable_size(picture: Picture) -> Picture:
     return dataclasses.replace(picture, meshes=meshes, points=points, contours=contours, depths=depths, unit=unit)
 
 
-def render(meshes, size, azimuth, elevation, contacts=None, intersecting=None, framed=None):
+def render(meshes, size, azimuth, elevation, contacts=None, intersecting=None, framed=None, planes=0):
     """(image (h,w,4) sRGB with alpha, camera, depth (h,w)) of meshes [(name, vertices, faces, edges)].
 
     contacts: (points (N,3), times of impact (N,)), around which surfaces are tinted. intersecting: as of `Picture`.
-    framed: (N,3) points that are in view; None: all.
+    framed: (N,3) points that are in view; None: all. planes: as of `Picture`: only their edges are drawn where the view
+    is from outside the half-space, which would hide the meshes; they cast no shadow.
     """
     vertices = np.concatenate([np.asarray(v, dtype=np.float64) for _, v, *_ in meshes])
     sizes = [len(v) for _, v, *_ in meshes]
@@ -128,10 +132,16 @@ def render(meshes, size, azimuth, elevation, contacts=None, intersecting=None, f
     paint = _paint(vertices, faces, contacts, intersecting)
     extent = float(np.ptp(vertices, axis=0).max())
     around, sides, coloured_as = tubes(vertices, edges, RADIUS * extent)
+    first, last = (sum(len(mesh[2]) for mesh in meshes[:count]) for count in (len(meshes) - planes, len(meshes)))
     faces = np.concatenate([faces, sides + len(vertices)])
     vertices, colours = np.concatenate([vertices, around]), np.concatenate([colours, colours[coloured_as]])
     large = (size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING)
     camera = Camera(vertices if framed is None else framed, large, azimuth, elevation)
+    casting = np.delete(faces, slice(first, last), axis=0)
+    corners = vertices[faces[first:last]]
+    outwards = np.cross(corners[:, 2] - corners[:, 0], corners[:, 1] - corners[:, 0])
+    outside = np.einsum("fx,fx->f", outwards, camera.eye - corners[:, 0]) >= 0
+    faces[first:last][outside] = 0  # without area: not drawn
     buffers = rasterize(camera.project(vertices)[faces], large)
     light = LIGHT @ np.array(
         [
@@ -140,7 +150,7 @@ def render(meshes, size, azimuth, elevation, contacts=None, intersecting=None, f
             [0, 0, 1],
         ]
     )
-    shaded = shade(buffers, camera, vertices, faces, colours, light, paint)
+    shaded = shade(buffers, camera, vertices, faces, casting, colours, light, paint)
     alpha = (buffers.triangle >= 0).astype(np.float64)[..., None]
     shaded = np.concatenate([shaded, alpha], axis=2)
     h, w = size[1], size[0]

@@ -10,9 +10,8 @@ import hpccd_core as hc
 from hpccd_core.options import FEATURES
 from hpccd_ros.detect.interpenetration import Depth
 from hpccd_ros.detect.plane_patch import FACES as PATCH_FACES
-from hpccd_ros.detect.plane_patch import patch
+from hpccd_ros.detect.plane_patch import OUTLINE, patch
 from hpccd_ros.detect.separation import Separation, Thickness
-from hpccd_ros.frames.types import NO_EDGES
 from hpccd_ros.middleware.contact_messages import times_of
 from hpccd_ros.picture import contacts as picture
 from hpccd_ros.picture.intersecting import IntersectingFaces
@@ -59,6 +58,7 @@ def draw_step(
         intersecting=marked,
         contours=[] if intersecting is None else _seen(intersecting.contours, step, meshes),
         depths=[] if intersecting is None else _seen(intersecting.depths, step, meshes),
+        planes=sum(faces is PATCH_FACES for _, _, faces, _ in meshes),
     )
     context = None
     if history is not None and len(history.steps) > 1:
@@ -146,5 +146,6 @@ def meshes_in_the_middle(step: ReplayedStep, visual: VisualGeometry = NO_VISUAL)
         for name, vertices in after.items()
         if name in before
     ]
-    patches = ((plane.name, patch(plane, [vertices for _, vertices, *_ in meshes])) for plane in step.planes)
-    return meshes + [(name, corners, PATCH_FACES, NO_EDGES) for name, corners in patches if corners is not None]
+    places = [vertices for _, vertices, *_ in meshes]
+    patches = ((plane.name, patch(plane, places, margin=0.05)) for plane in step.planes)
+    return meshes + [(name, corners, PATCH_FACES, OUTLINE) for name, corners in patches if corners is not None]

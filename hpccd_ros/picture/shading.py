@@ -24,11 +24,12 @@ def vertex_normals(vertices, faces):
     return out / np.maximum(np.linalg.norm(out, axis=1), 1e-30)[:, None]
 
 
-def shade(buffers, camera, vertices, faces, colours, light, paint):
+def shade(buffers, camera, vertices, faces, casting, colours, light, paint):
     """(height, width, 3) linear colours of what `buffers` see, 0 where they see nothing.
 
-    colours: (V,3) linear. light: direction towards the key light. paint: takes the positions (N,3) of pixels, their
-    triangles (N,) and their own colours (N,3); returns their colours before they are lit.
+    casting: the faces (C,3) that cast shadows. colours: (V,3) linear. light: direction towards the key light. paint:
+    takes the positions (N,3) of pixels, their triangles (N,) and their own colours (N,3); returns their colours before
+    they are lit.
     """
     vertices = vertices.astype(np.float32)
     seen = buffers.triangle >= 0
@@ -43,7 +44,7 @@ def shade(buffers, camera, vertices, faces, colours, light, paint):
     back = _dot(normal, view) < 0  # both sides are lit: a cloth has no inside
     normal[back] *= -1
     light = (np.asarray(light) / np.linalg.norm(light)).astype(np.float32)
-    lit = _sunlight(vertices, faces, light, position + np.float32(1e-3 * np.ptp(vertices, axis=0).max()) * normal)
+    lit = _sunlight(vertices, casting, light, position + np.float32(1e-3 * np.ptp(vertices, axis=0).max()) * normal)
     crease = _crease_darkening(buffers.depth)[seen]
     half = light + view
     _normalize(half)

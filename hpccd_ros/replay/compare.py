@@ -26,6 +26,8 @@ def difference(
     """
     total = len(contacts)
     then, now = list(recorded.topology_versions), list(layout.topology_versions)
+    if len(then) != len(now):
+        return f"meshes {', '.join(recorded.mesh_names)} were recorded, now they are {', '.join(layout.mesh_names)}"
     if then != now:
         return f"topology versions {then} were recorded, now they are {now}"
     if problem := _malformed(recorded, layout):

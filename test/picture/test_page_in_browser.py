@@ -183,6 +183,33 @@ def test_meshes_are_hidden_and_the_view_is_turned(browser, small_bag, tmp_path):
     assert browser.said == []
 
 
+def test_planes_are_drawn_from_within_only_and_do_not_widen_the_view(browser, hpccd, small_bag, tmp_path):
+    (tmp_path / "planes.yaml").write_text(
+        "/**: {ros__parameters: {meshes: [cloth, ball], mesh: {ball: {self_collision: false}}, "
+        "planes: [floor, wall], plane: {floor: {offset: -0.3}, wall: {normal: [-1.0, 0.0, 0.0], offset: -0.6}}}}"
+    )
+    ball, wall = [], []
+    for given in ([], ["--params", "planes.yaml"], ["--params", "planes.yaml", "--azimuth", "120"]):
+        assert hpccd("view", small_bag, "--html", "run.html", "--step", 60, *given).returncode == 0
+        scene = opened(browser, tmp_path / "run.html")
+        legend = browser.evaluate("document.getElementById('meshes').textContent")
+        for box in ("contacts", "intersecting", "curves"):
+            browser.evaluate(f"document.getElementById('show-{box}').click()")
+        scene.show(0, False)
+        if given:
+            assert legend.count("plane") == 2
+            scene.show(2, False)
+            scene.show(3, False)
+        ball.append(scene.drawn()[100:].mean())  # below the notice
+        if given:
+            scene.show(1, False)
+            scene.show(3, True)
+            wall.append(scene.drawn()[100:].mean())  # below the notice
+    assert ball[1] == pytest.approx(ball[0], rel=0.05)
+    assert 0 < wall[0] < 0.02 and wall[1] > 0.2
+    assert browser.said == []
+
+
 def test_names_are_shown_and_never_run(browser, small_bag, tmp_path):
     page_of(small_bag, tmp_path / "wild.html", shown=lambda number: number > 60, names=HOSTILE, title=HOSTILE[0])
     opened(browser, tmp_path / "wild.html")

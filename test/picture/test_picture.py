@@ -9,7 +9,8 @@ from matplotlib.image import imread
 
 import hpccd_core as hc
 from hpccd_ros.detect.interpenetration import Depth
-from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.detect.plane_patch import FACES, OUTLINE, patch
+from hpccd_ros.detect.scene import PlaneSettings, SceneBuilder
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.frames.types import NO_EDGES, MeshSettings, Topology
 from hpccd_ros.picture import contacts, curves, panels, tint
@@ -95,6 +96,27 @@ def test_the_surface_is_rendered_within_the_range_of_colours():
     assert image.shape == (200, 320, 4) and 0 <= image.min() and image.max() <= 1
     seen = image[..., 3] > 0.5
     assert seen.mean() > 0.2 and np.isfinite(depth[::2, ::2][seen]).mean() > 0.98
+
+
+def test_a_plane_is_drawn_from_within_its_half_space_only():
+    sphere, faces = hc.shapes.icosphere(3)
+    ball = ("ball", 0.5 * sphere + [0, 0, 0.5], faces, NO_EDGES)
+    shown = []
+    for offset in (-0.7, 0.7):  # behind the ball, and between it and the camera at azimuth 0
+        wall = PlaneSettings("wall", (-np.sign(offset), 0.0, 0.0), -0.7)
+        corners = patch(wall, [ball[1]])
+        assert np.allclose(corners[:, 0], offset)
+        assert (corners[:, 1:].min(axis=0) < ball[1][:, 1:].min(axis=0)).all()
+        assert (corners[:, 1:].max(axis=0) > ball[1][:, 1:].max(axis=0)).all()
+        meshes = [ball, ("wall", corners, FACES, OUTLINE)]
+        image, camera, depth = contacts.render(meshes, (320, 200), 0, 0, planes=1)
+        column, row, distance = camera.project(np.array([[0.5, 0.0, 0.5]]))[0]
+        assert depth[int(row), int(column)] == pytest.approx(distance, rel=1e-2), "the ball is seen"
+        shown.append((image[..., 3] > 0.5).mean())
+    assert shown[0] > 1.5 * shown[1]
+    lit, *_ = contacts.render([ball, ("wall", corners, FACES, NO_EDGES)], (320, 200), 0, 0, planes=1)
+    alone, *_ = contacts.render([ball], (320, 200), 0, 0, framed=np.concatenate([ball[1], corners]))
+    assert np.abs(lit - alone).max() < 0.02, "it casts no shadow"
 
 
 def test_edges_are_drawn_as_tubes_around_them():

@@ -89,3 +89,11 @@ def test_a_misspelt_name_in_the_file_is_rejected_as_the_node_rejects_it(foreign,
     done = hpccd("replay", foreign, "--params", path)
     assert done.status == 2 and "minimum_seperation: no such parameter; " in done.err
     assert done.err.endswith("did you mean minimum_separation?\n")
+
+
+def test_a_plane_that_the_node_did_not_have_is_named(small_bag, tmp_path):
+    path = tmp_path / "node.yaml"
+    path.write_text(NODE + "    mesh: {ball: {self_collision: false}}\n    planes: [floor]\n")
+    done = hpccd("replay", small_bag, "--params", path)
+    assert done.status == 1 and "DIVERGED: 89 of 89 results differ" in done.out, done
+    assert "meshes cloth, ball were recorded, now they are cloth, ball, floor" in done.out

@@ -12,7 +12,7 @@ from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import shortened
 from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.detect.plane_patch import FACES as PATCH_FACES
-from hpccd_ros.detect.plane_patch import patch
+from hpccd_ros.detect.plane_patch import OUTLINE, patch
 from hpccd_ros.frames.types import Topology
 from hpccd_ros.picture import curves
 from hpccd_ros.picture.contacts import BACKGROUND, FAINT, INK, INTERSECTING, TOC_COLOURS, mesh_colours, mesh_groups
@@ -33,7 +33,7 @@ GAP = "(dropped, not recorded, or started with another topology)"
 # Colours of times of contact between which the page blends.
 TOC_SHADES = 33
 
-_PATCH = Topology(0, 4, PATCH_FACES)
+_PATCH = Topology(0, 4, PATCH_FACES, OUTLINE)
 
 
 class RecordingPage:
@@ -62,6 +62,7 @@ class RecordingPage:
         self._view = {"azimuth": azimuth, "elevation": elevation}
         self._steps: list[dict] = []
         self._patches: dict = {}
+        self._planes: set[int] = set()  # numbers of meshes that are planes
         self._first_end: int | None = None
         self._numbers: list[int] = []  # of all steps of the recording
         self._missing = self._differ = self._truncated = self._cut = 0
@@ -117,6 +118,7 @@ class RecordingPage:
             elif number < len(frame.topologies):
                 mesh.add(frame.topologies[number], frame.vertices[number])
             else:
+                self._planes.add(number)
                 self._add_plane(mesh, step.planes[number - len(frame.topologies)], frame)
         found = {} if frame is None else self._visual.vertices(self._names, frame)
         for name, mesh in self._seen.items():
@@ -180,7 +182,8 @@ class RecordingPage:
             if mesh.name in self._seen:
                 group += ": collision geometry" if collision else ""
             hidden = collision and mesh.name in self._seen
-            meshes.append({**description, "colour": colour, "group": group, "hidden": hidden})
+            plane = number in self._planes
+            meshes.append({**description, "colour": colour, "group": group, "hidden": hidden, "plane": plane})
             blobs |= {f"mesh-{number}-{name}": data for name, data in of_mesh.items()}
         gaps = _gaps(self._numbers)
         contacts, columns = self._contacts.described()

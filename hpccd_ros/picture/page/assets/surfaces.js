@@ -19,6 +19,8 @@ class Surfaces {
     });
     this.tint = new Tint(recording);
     this.tint.paint(this.material);
+    this.planes = this.material.clone(); // seen from outside, a plane would hide the meshes: only its edges are drawn
+    this.planes.side = THREE.FrontSide;
     this.marks = this.material.clone(); // without the offset: in front of the surface
     this.marks.setValues({ vertexColors: false, polygonOffset: false, transparent: true, opacity: 0.7 });
     this.marks.color.set(recording.colours.intersecting).convertSRGBToLinear();
@@ -36,7 +38,7 @@ class Surfaces {
     for (const mesh of recording.meshes.keys()) {
       const shown = recording.shown(mesh, step);
       if (!shown || !shown.topology.vertices || !this.visible[mesh]) continue;
-      const drawn = (this.drawn[mesh][shown.number] ??= this.make(shown.topology, this.own[mesh]));
+      const drawn = (this.drawn[mesh][shown.number] ??= this.make(shown.topology, this.own[mesh], recording.meshes[mesh].plane));
       const { position } = drawn.geometry.attributes;
       const start = shown.frame * shown.topology.vertices;
       recording.place(recording.meshes[mesh], shown.topology.positions, start, start + position.count, position.array);
@@ -50,16 +52,18 @@ class Surfaces {
     }
   }
 
-  make(topology, colour) {
+  make(topology, colour, plane) {
     const geometry = new THREE.BufferGeometry();
     const places = new THREE.BufferAttribute(new Float32Array(3 * topology.vertices), 3);
     geometry.setAttribute("position", places.setUsage(THREE.DynamicDrawUsage));
     const colours = Float32Array.from({ length: 3 * topology.vertices }, (_, i) => colour[i % 3]);
     geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
     geometry.setIndex(topology.faces ? new THREE.BufferAttribute(topology.indices, 1) : null);
-    const object = topology.faces ? new THREE.Mesh(geometry, this.material) : new THREE.Points(geometry, this.points);
+    const material = plane ? this.planes : this.material;
+    const object = topology.faces ? new THREE.Mesh(geometry, material) : new THREE.Points(geometry, this.points);
     const edges = new THREE.Mesh(geometry, this.edges);
-    object.castShadow = object.receiveShadow = true;
+    object.receiveShadow = true;
+    object.castShadow = !plane;
     object.frustumCulled = edges.frustumCulled = false; // its bounds would be those of another step
     return { geometry, object, edges, lines: topology.edges ? this.makeLines(geometry, topology) : null };
   }

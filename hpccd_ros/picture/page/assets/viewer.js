@@ -81,12 +81,12 @@ class Stage {
     if (this.reach) this.camera.frame(this.reach);
   }
 
-  // True where the view has to be wider for this step.
+  // True where the view has to be wider for this step. Planes extend beyond it.
   widen(step) {
     const { recording } = this, before = this.reach;
     for (const [mesh, visible] of this.surfaces.visible.entries()) {
       const shown = visible && recording.shown(mesh, step);
-      if (!shown || !shown.topology.vertices) continue;
+      if (!shown || !shown.topology.vertices || recording.meshes[mesh].plane) continue;
       const start = shown.frame * shown.topology.vertices;
       const places = new Float32Array(3 * shown.topology.vertices);
       recording.place(recording.meshes[mesh], shown.topology.positions, start, start + shown.topology.vertices, places);
@@ -388,6 +388,7 @@ class Viewer {
 }
 
 function sizeOf(mesh, steps) {
+  if (mesh.plane) return mesh.topologies.length ? "plane" : "plane, far away";
   if (!mesh.topologies.length) return "no frames";
   const last = mesh.topologies.at(-1), versions = mesh.topologies.length;
   const count = (kind) => last[kind].toLocaleString("en");
