@@ -280,7 +280,8 @@ def integers(name: str, value: object) -> NDArray[Any]:
     array = _array(name, value)
     indices = _integers_of_any_size(value, array) if array.dtype.kind in "fO" else array
     if array.ndim and array.size and array.dtype.kind not in "iu" and indices is array:
-        raise TypeError(f"{name}: expected integers, got {_kind(value, array)}")
+        remedy = f"; of a mask give numpy.flatnonzero({name})" if array.dtype.kind == "b" else ""
+        raise TypeError(f"{name}: expected integers, got {_kind(value, array)}{remedy}")
     return indices
 
 
@@ -438,7 +439,8 @@ def _of_meshes(name: str, value: Mapping[Any, Any], shape: tuple[int, ...], layo
         if mesh not in value:
             if mesh in planes:
                 continue
-            raise ValueError(f"{name}: has no positions of mesh {mesh!r}; give those of every mesh: {there}")
+            every = ", ".join(other for other in layout.mesh_names if other not in planes)
+            raise ValueError(f"{name}: has no positions of mesh {mesh!r}; give those of every mesh: {every}")
         of_mesh = f"{name}[{mesh!r}]"
         given = value[mesh]
         if type(given) is not np.ndarray and hasattr(given, "__cuda_array_interface__"):
@@ -448,6 +450,8 @@ def _of_meshes(name: str, value: Mapping[Any, Any], shape: tuple[int, ...], layo
         array = _reals(of_mesh, _array(of_mesh, given), given)
         expected = (*shape[:-2], n_vertices, 3)
         if array.shape != expected:
+            if mesh in planes:
+                raise ValueError(f"{of_mesh}: is a plane, which has no vertices; leave it out")
             remedy = _remedy_for_positions(of_mesh, array, expected, None)
             raise ValueError(f"{of_mesh}: expected shape {expected}, one row per vertex, got {array.shape}{remedy}")
         parts.append(array)

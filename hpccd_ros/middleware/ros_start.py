@@ -28,7 +28,7 @@ _REMEDIES = {
     "Sequence should be of same type": "the entries of a list need one type: write 0.0, not 0, beside 0.5",
     "remap rule": "write -r FROM:=TO",
     "parameter override rule": "write -p NAME:=VALUE, and texts with a colon in quotes: -p NAME:=\"['a:b']\"",
-    "Error parsing": f"{_FILE}; quote values that contain ://",  # libyaml rejects them within braces
+    "Error parsing": f"{_FILE}; quote values that contain a colon",  # libyaml rejects it within brackets and braces
     "params file": _FILE,
     "--params-file flag": "write --params-file FILE",
     "ROS_DOMAIN_ID": "set it to 0 .. 232, or unset it",

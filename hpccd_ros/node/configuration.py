@@ -90,11 +90,12 @@ class Configuration:
 
     def summary(self, contacts: str) -> str:
         """For the log, in one line. contacts: name of the topic."""
-        options, robots = self.options, self.settings["robots"]
+        options = self.options
+        robots, planes = (listed(self.settings[kind]) for kind in ("robots", "planes"))
         where = f"on this host only ({environment.DISCOVERY}=SUBNET opens it)"
         meshes = listed(self.meshes) or ("none" if robots else "none (service only)")
         return (
-            f"meshes {meshes}; {f'robots {listed(robots)}; ' if robots else ''}"
+            f"meshes {meshes}; {f'robots {robots}; ' if robots else ''}{f'planes {planes}; ' if planes else ''}"
             f"tests {listed(options.features)}; accuracy {options.accuracy}, backend {options.backend}, "
             f"contacts on {contacts}; "
             f"discovery {where if environment.this_host_only() else 'beyond this host'}"

@@ -32,6 +32,10 @@ _SECTIONS: dict[str, tuple[str, Sequence[Row]]] = {
 _QOS = "qos_overrides"  # of a topic that the node does not have: without effect
 _FIRST_PARTS = (*_SECTIONS, PAIRS, _QOS)
 _NAMES = [row.name for row in NODE_ROWS]
+# Parameters of the node whose entries are NAME:VALUE.
+_OF_MOVING = ("thickness", "stop_detail")
+# Parameters of a mesh that no other node is likely to have.
+_OF_MESHES = ("ignored_rings", "ignored_at_rest")
 # Whatever begins so is taken for a parameter of the topic stop.
 _STOP = "stop"
 # From this similarity on (difflib, 0 .. 1) a name is taken for a misspelt one of ours: 0.92 for stop_distanse and
@@ -79,6 +83,8 @@ def _problem(name: str, settings: dict[str, Any]) -> str:
         return f"{shown}: no such parameter; did you mean {shortened(f'{near}.{rest}')}?" if near else ""
     if near := suggestion(first.lower(), _NAMES, _NEAR):
         return f"{shown}: no such parameter; {_FOREIGN}{near}"
+    if first in _OF_MESHES:
+        return f"{shown}: no such parameter of the node; write {MESH}.NAME.{first}"
     if first.lower().startswith(_STOP):
         return (
             f"{shown}: no such parameter; those of the topics stop and speed_scale are "
@@ -101,6 +107,8 @@ def _in_section(first: str, rest: str, settings: dict[str, Any]) -> str:
             f"{shortened(owner)} is not in the parameter {parameter} ({listed(names) or 'which is empty'}); add it "
             f"there, or leave out {first}.{shortened(owner)}.*{meant}"
         )
+    if key in _OF_MOVING and first != PLANE:
+        return f"no such parameter of a {first}; write {key}: [\"{shortened(owner)}:VALUE\"]"
     near = suggestion(key, keys)
     return f"no such parameter of a {first}; there are {', '.join(keys)}" + near
 

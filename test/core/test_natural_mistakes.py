@@ -46,6 +46,12 @@ def scene():
     return scene
 
 
+def with_floor():
+    added = scene()
+    added.add_plane("floor")
+    return added
+
+
 def one_based():
     scene = hc.Scene()
     scene.add_mesh("cloth", CLOTH_FACES + 1)
@@ -178,6 +184,30 @@ MISTAKES = {
         "no mesh is named 'Cloth'.*you mean cloth[?]",
     ),
     "dict, missing mesh": (detect(BOTH, {"cloth": CLOTH}), "vertices_t1: has no positions of mesh 'ball'; give"),
+    "dict, missing mesh beside a plane": (
+        lambda: hc.Detector(with_floor()).detect({}, {}),
+        "has no positions of mesh 'cloth'; give those of every mesh: cloth, ball$",
+    ),
+    "positions of a plane": (
+        lambda: hc.Detector(with_floor()).proximity({"cloth": CLOTH, "ball": BALL, "floor": CLOTH}, 0.1),
+        r"vertices\['floor'\]: is a plane, which has no vertices; leave it out",
+    ),
+    "faces as a mask": (
+        lambda: scene().ignore_faces("cloth", CLOTH[CLOTH_FACES[:, 0], 0] > 0, "ball"),
+        r"faces: expected integers, got dtype bool; of a mask give numpy\.flatnonzero\(faces\)",
+    ),
+    "positions for a number of points": (
+        lambda: scene().add_points("grains", CLOTH),
+        r"n: expected a number of points; give len\(points\)",
+    ),
+    "a thickness for each vertex": (
+        lambda: detector()().set_thickness("ball", np.ones(12)),
+        r"thickness: 'ball' .*each face \(20\), but 12 were given; .*thickness\[faces\]\.max\(axis=1\)",
+    ),
+    "a radius for each end of a rod": (
+        lambda: scene().add_points("rod", 2, edges=[[0, 1]], thickness=[0.1, 0.1]),
+        r"thickness: expected one number, or one for each edge \(1\), got 2",
+    ),
     "dict, swapped meshes": (
         detect({"cloth": BALL, "ball": CLOTH}, BOTH),
         r"vertices_t0\['cloth'\]: expected .*\(9, 3\)",

@@ -89,8 +89,9 @@ FILES = {
     "url-in-braces": (
         HEAD + "    robot: {r: {description: package://arm/arm.urdf, joint_states: js}}\n",
         2,
-        "names and values; quote values that contain ://",
+        "names and values; quote values that contain a colon",
     ),
+    "colon-in-brackets": (HEAD + "    thickness: [cloth:0.002]\n", 2, "quote values that contain a colon"),
     "random-bytes": (bytes((i * i * 31 + i) % 256 for i in range(4096)), 2, "Couldn't parse params file"),
     "zeros": (bytes(4096), 2, "Couldn't parse params file"),
     "wildcard": ("/*:\n  ros__parameters:\n    accuracy: sloppy\n", 2, "accuracy: 'sloppy'"),

@@ -58,6 +58,18 @@ REJECTED = {
         "mesh.cloth.fil: no such parameter of a mesh; there are input, static, self_collision, ignored_rings, "
         "ignored_at_rest, file, transform, frame, pose; did you mean file?",
     ),
+    "thickness-of-a-mesh": (
+        CLOTH | {"mesh.cloth.thickness": 0.002},
+        'mesh.cloth.thickness: no such parameter of a mesh; write thickness: ["cloth:VALUE"]',
+    ),
+    "thickness-of-a-plane": (
+        CLOTH | {"planes": ["floor"], "plane.floor.thickness": 0.002},
+        "plane.floor.thickness: no such parameter of a plane; there are normal, offset",
+    ),
+    "filter-of-no-mesh": (
+        CLOTH | {"ignored_rings": 2},
+        "ignored_rings: no such parameter of the node; write mesh.NAME.ignored_rings",
+    ),
     "name-of-a-mesh": (
         CLOTH | {"mesh.clot.static": True},
         "mesh.clot.static: clot is not in the parameter meshes (cloth); add it there, or leave out mesh.clot.*; did "

@@ -152,6 +152,7 @@ def test_planes_are_drawn(start_node):
     heard = listen(node, MarkerArray, "markers", qos.MARKERS)
     stream = Thick(node)
     stream.send()
+    assert "active: meshes cloth, net; planes floor, wall; tests" in node.output()
     node.wait_until(lambda: heard, "markers")
     planes = [marker for marker in heard[-1].markers if marker.ns == "planes"]
     assert [len(marker.points) for marker in planes] == [6, 6]

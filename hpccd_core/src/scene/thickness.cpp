@@ -28,9 +28,12 @@ void check_thickness(const Scene::Mesh& mesh, std::span<const double> values) {
   if (mesh.plane)
     throw InvalidArgument("thickness: '" + mesh.name + "' is a plane, which has none; set the separation of its pairs");
   const Elements elements = elements_of(mesh);
-  if (values.size() != 1 && values.size() != elements.n)
+  if (values.size() != 1 && values.size() != elements.n) {
+    const bool of_vertices = mesh.n_faces > 0 && values.size() == mesh.n_vertices;
     throw InvalidArgument("thickness: '" + mesh.name + "' needs one value, or one for each " + elements.name + " (" +
-                          std::to_string(elements.n) + "), but " + std::to_string(values.size()) + " were given");
+                          std::to_string(elements.n) + "), but " + std::to_string(values.size()) + " were given" +
+                          (of_vertices ? "; from one for each vertex: thickness[faces].max(axis=1)" : ""));
+  }
   for (const double t : values) {
     check_length("thickness", t);
     // The sum of two must be finite: distances of surfaces are less it.
