@@ -155,10 +155,11 @@ def _lines(report):
         yield f"  remedy: {defect.remedy}"
     if not report.defects:
         yield "\nno defects"
-    yield (
-        "\nKeep separation and thickness below the smallest gap: above it, parts of the mesh are in contact at rest.\n"
-        "For a thicker mesh, ignore neighbours: scene.ignore_within(mesh, rings=2)."
-    )
+    if 0 < report.smallest_gap < np.inf:
+        yield (
+            "\nKeep the separation plus twice the thickness below the smallest gap, or parts of the mesh are in contact "
+            "at rest.\nFor a thicker mesh, ignore neighbours: scene.ignore_within(mesh, rings=2)."
+        )
 
 
 def _gpu(status) -> dict[str, str]:

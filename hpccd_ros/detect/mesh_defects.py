@@ -63,12 +63,13 @@ def examine(vertices: NDArray[np.float64], faces: NDArray[np.uint32], distance: 
     equal = hc.weld(vertices, faces)[2]
     used = np.zeros(len(vertices), bool)
     used[faces] = True
+    t_junctions = _t_junctions(welded, triangles, first, distance, used)
     defects = (
         Defect(
             "doubled vertices",
             _later_of_groups(equal),
             "vertex and the earlier one at its position",
-            "Faces on both sides of such a seam touch at every time: collision_free_step is 0, and every call reports "
+            "Faces on both sides of such a seam touch at all times: collision_free_step is 0, and every call reports "
             "contacts there.",
             "vertices, faces, index = hpccd_core.weld(vertices, faces)",
         ),
@@ -81,11 +82,18 @@ def examine(vertices: NDArray[np.float64], faces: NDArray[np.uint32], distance: 
         ),
         Defect(
             "T-junctions",
-            _t_junctions(welded, triangles, first, distance, used),
+            t_junctions,
             "vertex, and the two ends of the edge that it lies on",
-            "The vertex touches faces of the edge at every time, as a doubled vertex does; welding does not help.",
+            "The vertex touches faces of the edge at all times, as a doubled vertex does; welding does not help.",
             "split those faces at the vertex, or ignore pairs that touch at rest: "
             "scene.ignore_within(mesh, rest_vertices=vertices, distance=...)",
+        ),
+        Defect(
+            "self-intersections",
+            _crossings(welded, triangles, index, first, faces, t_junctions),
+            "the ends of an edge, and the face that it intersects",
+            "Parts that intersect already are not kept apart: moving on together is no contact.",
+            "pull the parts apart; docs/inside.md untangles a cloth with detector.intersections(vertices)",
         ),
         Defect(
             "faces without area",
@@ -164,6 +172,26 @@ def _scene(vertices: NDArray[np.float64], faces: NDArray[np.uint32]) -> hc.Scene
 
 def _smallest_gap(vertices: NDArray[np.float64], faces: NDArray[np.uint32]) -> float:
     return min((gap.distance for gap in hc.Detector(_scene(vertices, faces)).distances(vertices)), default=np.inf)
+
+
+def _crossings(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.uint32],
+    index: NDArray[np.intp],
+    first: NDArray[np.intp],
+    given: NDArray[np.uint32],
+    t_junctions: NDArray[np.intp],
+) -> NDArray[np.intp]:
+    """(K, 3) edges and faces of the welded mesh that share a point and no vertex, numbered as in the mesh; those at
+    T-junctions left out. index, first: from the vertices of the mesh to those of the welded one, and back. given: the
+    faces of the mesh."""
+    found = hc.Detector(_scene(vertices, faces)).intersections(vertices).ef.astype(np.intp)
+    at_junction = np.zeros(len(vertices), bool)
+    at_junction[index[t_junctions[:, 0]]] = True
+    found = found[~at_junction[np.column_stack([found[:, :2], faces[found[:, 2]]])].any(axis=1)]
+    a, b, c = index[given].T
+    kept = np.flatnonzero((a != b) & (b != c) & (c != a))
+    return np.column_stack([first[found[:, :2]], kept[found[:, 2]]])
 
 
 def _n_components(faces: NDArray[np.uint32], n_vertices: int) -> int:

@@ -108,3 +108,28 @@ def test_only_faces_without_area():
     report = examine(np.zeros((2, 3)), np.array([[0, 1, 1]], np.uint32))
     assert [d.name for d in report.defects] == ["doubled vertices", "faces without area"]
     assert report.smallest_gap == np.inf and report.shortest_edge == report.median_edge == 0
+
+
+def test_self_intersections_are_numbered_as_in_the_mesh():
+    ball, faces = hc.shapes.icosphere(2)
+    n, m = len(ball), len(faces)
+    # Doubled corners of a face before the balls, and a face that welding leaves out: numbers differ in the welded mesh.
+    vertices = np.concatenate([ball[faces[0]], ball, ball + [0.7, 0.05, 0.02]])
+    both = np.concatenate([[[0, 1, 2]], [[0, 3 + faces[0, 0], 1]], faces[1:] + 3, faces + 3 + n]).astype(np.uint32)
+    scene = hc.Scene()
+    scene.add_mesh("a", faces, self_collision=False)
+    scene.add_mesh("b", faces, self_collision=False)
+    ef = hc.Detector(scene).intersections(vertices[3:]).ef.astype(int)
+    corner = {int(k): i for i, k in enumerate(faces[0])}
+    expected = sorted(
+        sorted(corner.get(v, v + 3) for v in row[:2]) + [0 if row[2] == 0 else int(row[2]) + 1] for row in ef.tolist()
+    )
+    got = found(vertices, both)
+    assert len(expected) > 10 and sorted(sorted(r[:2]) + r[2:] for r in got["self-intersections"]) == expected
+    assert "self-intersections" not in found(vertices[: 3 + n], both[: m + 1])
+
+
+def test_t_junctions_are_no_self_intersections():
+    vertices = np.array([[0, 0, 0], [2, 0, 0], [0, 2, 0], [1, 0, 0], [0, -1, 0], [2, -1, 0]], float)
+    faces = np.array([[0, 1, 2], [0, 3, 4], [3, 1, 5], [3, 4, 5]], np.uint32)
+    assert found(vertices, faces).keys() == {"T-junctions", "edges with faces of opposite orientation"}
