@@ -168,14 +168,14 @@ class Scene:
         """
         name = arguments.text("name", name)
         if np.ndim(n):
-            raise TypeError("n: expected a number of points; give len(points), and the positions to detect() as of a mesh")
+            raise TypeError("n: expected a number of points; give len(points), and the positions to detect()")
         n, segments = arguments.whole_number("n", n, 0, _MOST), arguments.edges(edges)
         self_collision, static = arguments.flag("self_collision", self_collision), arguments.flag("static", static)
         numbers = arguments.thickness(thickness)
         n_elements = len(segments) or n
         if len(numbers) not in (1, n_elements):
-            each = "edge" if len(segments) else "point"
-            raise ValueError(f"thickness: expected one number, or one for each {each} ({n_elements}), got {len(numbers)}")
+            each = f"each edge ({n_elements})" if len(segments) else f"each point ({n_elements})"
+            raise ValueError(f"thickness: expected one number, or one for {each}, got {len(numbers)}")
         none = np.empty((0, 3), np.uint32)
         self._repeat("add_mesh", (name, none, n, self_collision, static, segments.copy(), True))
         if numbers.any():

@@ -157,8 +157,8 @@ def _lines(report):
         yield "\nno defects"
     if 0 < report.smallest_gap < np.inf:
         yield (
-            "\nKeep the separation plus twice the thickness below the smallest gap, or parts of the mesh are in contact "
-            "at rest.\nFor a thicker mesh, ignore neighbours: scene.ignore_within(mesh, rings=2)."
+            "\nKeep the separation plus twice the thickness below the smallest gap, or parts of the mesh are in "
+            "contact at rest.\nFor a thicker mesh, ignore neighbours: scene.ignore_within(mesh, rings=2)."
         )
 
 

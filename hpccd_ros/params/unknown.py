@@ -108,7 +108,7 @@ def _in_section(first: str, rest: str, settings: dict[str, Any]) -> str:
             f"there, or leave out {first}.{shortened(owner)}.*{meant}"
         )
     if key in _OF_MOVING and first != PLANE:
-        return f"no such parameter of a {first}; write {key}: [\"{shortened(owner)}:VALUE\"]"
+        return f'no such parameter of a {first}; write {key}: ["{shortened(owner)}:VALUE"]'
     near = suggestion(key, keys)
     return f"no such parameter of a {first}; there are {', '.join(keys)}" + near
 
