@@ -61,6 +61,9 @@ NONE = Separation()
 #: (mesh, thickness) of meshes that are not infinitely thin.
 Thickness = tuple[tuple[str, float], ...]
 
+#: The core rejects more.
+MOST_THICKNESS = 1e300
+
 
 @dataclass(frozen=True)
 class MotionBounds:

@@ -86,6 +86,10 @@ class StepDetector:
         """In the order of the scene, planes last."""
         return self._names
 
+    @property
+    def plane_names(self) -> tuple[str, ...]:
+        return self._builder.plane_names
+
     def layout_of(self, frame: SceneFrame) -> Layout:
         """Of the scene with the topologies of ``frame``."""
         return self._builder.layout(frame.topologies)

@@ -3,15 +3,15 @@
 bounds, shapes at rest, inputs."""
 
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from hpccd.msg import ContactArray, DistanceArray
 
 from hpccd_core.options import FEATURES, REPORTS
-from hpccd_ros.base.quoting import counted
-from hpccd_ros.detect.separation import MotionBounds, Separation, Thickness
+from hpccd_ros.base.quoting import counted, quoted
+from hpccd_ros.detect.separation import MOST_THICKNESS, MotionBounds, Separation, Thickness
 from hpccd_ros.frames.taken_inputs import TakenInput
 
 
@@ -49,13 +49,17 @@ def fill_thickness(message: ContactArray | DistanceArray, thickness: Thickness) 
         message.thickness = array("d", (of_meshes.get(name, 0.0) for name in message.mesh_names))
 
 
-def read_thickness(message: ContactArray | DistanceArray) -> Thickness:
-    """Those that are not 0. Raises ValueError if the field is inconsistent or invalid."""
+def read_thickness(message: ContactArray | DistanceArray, planes: Container[str] = ()) -> Thickness:
+    """Those that are not 0. planes: names that are not those of meshes. Raises ValueError if the field is inconsistent
+    or invalid."""
     values = np.frombuffer(message.thickness, np.float64)
     _check_of_meshes(message, "thickness", len(values))
-    if not (np.isfinite(values).all() and (values >= 0).all()):
-        raise ValueError("thickness: must be finite and not negative")
-    return tuple((name, t) for name, t in zip(message.mesh_names, values.tolist(), strict=False) if t)
+    if not ((values >= 0) & (values <= MOST_THICKNESS)).all():
+        raise ValueError(f"thickness: must lie in [0, {MOST_THICKNESS:g}]")
+    thick = tuple((name, t) for name, t in zip(message.mesh_names, values.tolist(), strict=False) if t)
+    if plane := next((name for name, _ in thick if name in planes), None):
+        raise ValueError(f"thickness: {quoted(plane)} is a plane, which has none")
+    return thick
 
 
 def fill_rest(message: ContactArray, stamps: tuple[int, ...]) -> None:

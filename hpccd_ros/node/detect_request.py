@@ -104,14 +104,16 @@ def _names(request: Request, scene: NodeScene, most: int) -> tuple[list[str], li
     """Of the meshes and of the planes; by default all of the node."""
     planes = [name for name in scene.builder.plane_names if not request.mesh_names or name in request.mesh_names]
     names = [name for name in request.mesh_names or scene.topologies if name not in planes]
+    if not names and request.mesh_names:
+        raise RequestError(f"mesh_names: {listed(planes)} have no positions; name meshes that are tested against them")
     if not names:
         raise RequestError("mesh_names: empty, and the node has no meshes of its own")
     if len(names) > most:
         raise RequestError(
             f"mesh_names: {counted(len(names), 'mesh', 'meshes')}, at most {most} are taken (parameter max_meshes)"
         )
-    if len(set(names)) != len(names):
-        raise RequestError(f"mesh_names: names must differ, {repeated(names)} occurs twice")
+    if len(set(request.mesh_names)) != len(request.mesh_names):
+        raise RequestError(f"mesh_names: names must differ, {repeated(request.mesh_names)} occurs twice")
     return names, planes
 
 

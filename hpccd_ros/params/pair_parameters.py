@@ -171,7 +171,8 @@ def _of_meshes(
             if name in settings["planes"]:
                 meant = f"; {quoted(name)} is a plane, which has none: shift its offset, or use pair_separation"
             raise ParameterError(
-                f"{parameter}: {quoted(text)} must be NAME:{value} with a mesh out of {_names(settings)} and "
+                f"{parameter}: {quoted(text)} must be NAME:{value} with a mesh out of "
+                f"{_names(settings, of_planes=False)} and "
                 f"{what}{meant}"
             )
         first = given.setdefault(name, (text, number))
@@ -295,7 +296,7 @@ def _meant(settings: dict[str, Any], names: Sequence[str], text: str = "") -> st
     )
 
 
-def _names(settings: dict[str, Any]) -> str:
+def _names(settings: dict[str, Any], of_planes: bool = True) -> str:
     known = [*settings["meshes"], *settings["robots"], *(f"{robot}/LINK" for robot in settings["robots"])]
-    known += settings["planes"]
+    known += settings["planes"] if of_planes else []
     return listed(known) or "(none)"

@@ -97,7 +97,7 @@ def _malformed(message, layout) -> str | None:
             return f"{name} has {len(getattr(message, name))} entries for {count} contacts"
     try:
         read_separation(message)
-        read_thickness(message)
+        read_thickness(message, [layout.mesh_names[k] for k in layout.planes])
         read_rest(message)
         read_bounds(message)
     except ValueError as error:

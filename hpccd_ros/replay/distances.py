@@ -116,7 +116,7 @@ class DistanceCheck:
             self._differs(f"distances at {stamp} ns: accuracy {accuracy[:20]!r} is none of {', '.join(ACCURACIES)}")
             return
         try:
-            thickness = read_thickness(result)
+            thickness = read_thickness(result, self._detector.plane_names)
         except ValueError as error:
             self._differs(f"distances at {stamp} ns: the recorded result is malformed: {error}")
             return

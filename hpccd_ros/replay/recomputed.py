@@ -373,7 +373,7 @@ class Replay:
             separation, features = self._valid(recorded, read_separation) or NONE, read_features(recorded)
             # In the same number of parts: the tolerance may have been different.
             rigid = dataclasses.replace(options.rigid, parts=min(recorded.parts, MOST_PARTS))
-            thickness = self._valid(recorded, read_thickness)
+            thickness = self._valid(recorded, lambda message: read_thickness(message, self._detector.plane_names))
             options = dataclasses.replace(
                 options, separation=separation, features=features, rigid=rigid, thickness=thickness
             )

@@ -106,6 +106,7 @@ def test_streamed_changed_recorded_and_verified(start_node, tmp_path, hpccd):
     "name, value, reason",
     [
         ("thickness", ["cloth:-1"], "thickness: 'cloth:-1' must be NAME:THICKNESS with a mesh out of"),
+        ("thickness", ["nett:1"], "with a mesh out of cloth, net and a number from 0"),  # no planes
         ("thickness", ["floor:1"], "'floor' is a plane, which has none: shift its offset, or use pair_separation"),
         ("plane.floor.offset", 1.0, "plane.floor.offset: read-only while the node is configured"),
         ("planes", ["wall"], "read-only"),
@@ -136,6 +137,22 @@ def test_requests_have_the_planes_of_the_node(shared, planes):
     assert (
         gaps.mesh_names == (*MESHES, *planes) and (gaps.kind == DistanceArray.VERTEX_PLANE).sum() == 2 * len(planes) - 1
     )
+
+
+@pytest.mark.parametrize(
+    ("names", "reason"),
+    [
+        (["wall", "floor"], "mesh_names: floor, wall have no positions; name meshes that are tested against them"),
+        (["wall", *MESHES, "wall"], "mesh_names: names must differ, 'wall' occurs twice"),
+    ],
+)
+def test_requests_need_meshes_and_each_name_once(shared, names, reason):
+    ends = [dict(zip(MESHES, positions(k), strict=True)) for k in (0, 1)]
+    topologies = dict.fromkeys(MESHES, mesh_messages.topology_message(FACES, N * N))
+    request = client.collision_free_step_request(*ends, topologies=topologies)
+    request.mesh_names = names
+    response = ask(shared.node, request)
+    assert not response.success and response.message == reason
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,6 @@ from rclpy.serialization import serialize_message
 import hpccd_core as hc
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.bag.writer import BagWriter, Topic
-from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.detect.step_detector import StepDetector
 from hpccd_ros.middleware import contact_messages, fields, result_fields, snapshot_messages
@@ -52,7 +51,7 @@ def near_bag(tmp_path_factory):
 
 
 def _results(setup, frames):
-    layout = Layout.of(tuple(setup.meshes), frames[0].topologies)
+    layout = setup.builder.layout(frames[0].topologies)
     options = setup.options("exact", "cpu", 1)
     for first, last, separation in zip(frames, frames[1:], TOLD, strict=False):
         detector = StepDetector(setup.builder, dataclasses.replace(options, separation=separation, distances=True))
@@ -150,6 +149,11 @@ def test_the_command_tells_the_separations(near_bag, tmp_path, hpccd):
         ({"minimum_separation": 0.05}, "found now at t ="),
         ({"minimum_separation": -1.0}, "malformed: separation: a separation must be finite and not negative"),
         ({"separations": [0.5]}, "malformed: separation_mesh_a, separation_mesh_b and separations have 0, 0 and 1"),
+        ({"thickness": [0.5]}, "malformed: thickness: 1 entry for 2 meshes"),
+        ({"thickness": [0.0, -0.5]}, "malformed: thickness: must lie in [0, 1e+300]"),
+        ({"thickness": [float("nan"), 0.0]}, "malformed: thickness: must lie in [0, 1e+300]"),
+        ({"thickness": [1e301, 0.0]}, "malformed: thickness: must lie in [0, 1e+300]"),
+        ({"thickness": [1e300, 0.0]}, "found now at t ="),
         ({"distance": [0.5]}, "malformed: distance has 1 entries; contacts of a step have none"),
         ({"closest": [0.5]}, "malformed: closest has 1 entries"),
         ({"vertices": [5] * 6}, "malformed: vertices has 6 entries"),
@@ -175,6 +179,26 @@ def test_distances_that_differ_are_named(changed, near_bag, hpccd):
     done = hpccd("replay", path)
     assert done.returncode == 1 and "DIVERGED: 1 of 7 results about distances differ, the first:" in done.stdout
     assert "  7 results are equal in every contact" in done.stdout and "VERIFIED" not in done.stdout
+
+
+def test_a_thick_plane_diverges(near_bag, tmp_path):
+    path, inputs, _ = near_bag
+    with Recording(path) as recording:
+        info = recording.info
+    info["parameters"] |= {"planes": ["floor"], "plane.floor.offset": -10.0}
+    _write(tmp_path / "plane.mcap", info, inputs, [])
+    with Recording(tmp_path / "plane.mcap") as recording:
+        setup = recorded_setup.of_recording(recording)
+        source = FrameSource(setup, recording.topics)
+        frames = [frame for message in recording.messages(source.topics) for frame in source.push(message)]
+    results = list(_results(setup, frames))
+    assert list(results[0][0].mesh_names) == ["cloth", "ball", "floor"]
+    results[1] = [_copy(message, thickness=[0.0, 0.0, 0.5]) for message in results[1]]
+    _write(tmp_path / "thick.mcap", info, inputs, results)
+    replay, steps = _replay(tmp_path / "thick.mcap")
+    assert _counts(replay) == _counts(replay.distances) == (6, 1, 0)
+    assert steps[1].difference.endswith("malformed: thickness: 'floor' is a plane, which has none")
+    assert replay.distances.first.endswith("malformed: thickness: 'floor' is a plane, which has none")
 
 
 def test_distances_of_a_scene_without_pairs_are_verified(near_bag, tmp_path, hpccd):
