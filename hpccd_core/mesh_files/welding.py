@@ -14,6 +14,8 @@ from .. import _core, arguments
 from ..array_types import ArrayLike
 
 _PAIRS_AT_ONCE = 1 << 20  # candidates held in memory
+_LEAF = 8  # most points of a leaf
+_NODES_AT_ONCE = _PAIRS_AT_ONCE // _LEAF**2
 _DENSE = 16  # candidates per point from which cells are joined first
 _ODD = tuple(np.uint64(number) for number in (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9))
 
@@ -156,7 +158,11 @@ def _roots_within(points: NDArray[np.float64], distance: float) -> NDArray[np.in
         for a, b in (small.with_first_of_cell(), *small.with_first_beyond_side()):
             near = _within(points, a, b, distance)
             _connect(roots, a[near], b[near])
-    for a, b in cells.candidates(roots):
+    if cells.n_open(roots) > _DENSE * len(points):
+        found = _Halves(points).candidates(roots, distance)  # clusters side by side, which remain apart
+    else:
+        found = cells.candidates(roots)
+    for a, b in found:
         apart = roots[a] != roots[b]
         a, b = a[apart], b[apart]
         near = _within(points, a, b, distance)
@@ -227,39 +233,100 @@ class _Cells:
             near, runs = self._found(first, _key(beyond))
             yield near, self._order[self._starts[runs]]
 
+    def n_open(self, roots: NDArray[np.intp]) -> int:
+        """How many candidates there are now."""
+        return sum(int(self._open(*ranges, roots)[2].sum()) for ranges in self._ranges())
+
     def candidates(self, roots: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         """Pairs of points that may be near each other, in blocks. Omits pairs with a cell whose points all have the
         root of the other point; ``roots`` may change between two blocks."""
-        n = len(self._order)
-        place = np.arange(n)
-        last = self._starts[self._run_of + 1]
-        yield from self._expanded(self._order, self._run_of, place + 1, last, roots)
-        for points, runs in self._reaching:
-            yield from self._expanded(points, runs, self._starts[runs], self._starts[runs + 1], roots)
+        for ranges in self._ranges():
+            points, begin, count = self._open(*ranges, roots)
+            total = np.cumsum(count)
+            at = 0
+            while at < len(points):
+                done = total[at - 1] if at else 0
+                until = max(at + 1, int(np.searchsorted(total, done + _PAIRS_AT_ONCE, side="right")))
+                counts = count[at:until]
+                offsets = np.arange(counts.sum()) - np.repeat(total[at:until] - counts - done, counts)
+                yield np.repeat(points[at:until], counts), self._order[np.repeat(begin[at:until], counts) + offsets]
+                at = until
 
-    def _expanded(
+    def _ranges(self) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]]:
+        """Points, and the runs that they reach: those from a begin to an end in the order of cells."""
+        yield self._order, self._run_of, np.arange(len(self._order)) + 1, self._starts[self._run_of + 1]
+        for points, runs in self._reaching:
+            yield points, runs, self._starts[runs], self._starts[runs + 1]
+
+    def _open(
         self,
         points: NDArray[np.intp],
         runs: NDArray[np.intp],
         begin: NDArray[np.intp],
         end: NDArray[np.intp],
         roots: NDArray[np.intp],
-    ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-        """Each point with those from begin to end in the order of cells."""
+    ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+        """Those that have not joined all of the run: point, begin, and the number up to the end."""
         of_run = roots[self._order]
         low = np.minimum.reduceat(of_run, self._starts[:-1])
         one_root = low == np.maximum.reduceat(of_run, self._starts[:-1])
         wanted = (end > begin) & ~(one_root[runs] & (low[runs] == roots[points]))
-        points, begin, count = points[wanted], begin[wanted], (end - begin)[wanted]
-        total = np.cumsum(count)
-        at = 0
-        while at < len(points):
-            done = total[at - 1] if at else 0
-            until = max(at + 1, int(np.searchsorted(total, done + _PAIRS_AT_ONCE, side="right")))
-            counts = count[at:until]
-            offsets = np.arange(counts.sum()) - np.repeat(total[at:until] - counts - done, counts)
-            yield np.repeat(points[at:until], counts), self._order[np.repeat(begin[at:until], counts) + offsets]
-            at = until
+        return points[wanted], begin[wanted], (end - begin)[wanted]
+
+
+class _Halves:
+    """A tree of boxes: points are halved along the longest side of their box until few are left. Node k of a level has
+    nodes 2 k and 2 k + 1 of the next."""
+
+    def __init__(self, points: NDArray[np.float64]) -> None:
+        self._order = np.arange(len(points))
+        self._starts: list[NDArray[np.intp]] = []  # by level: where nodes begin in the order, and its end
+        self._low: list[NDArray[np.float64]] = []  # boxes
+        self._high: list[NDArray[np.float64]] = []
+        while True:
+            n_nodes = 2 ** len(self._starts)
+            starts = len(points) * np.arange(n_nodes + 1) // n_nodes
+            ordered = points[self._order]
+            self._starts.append(starts)
+            self._low.append(np.minimum.reduceat(ordered, starts[:-1]))
+            self._high.append(np.maximum.reduceat(ordered, starts[:-1]))
+            if np.diff(starts).max() <= _LEAF:
+                break
+            node = np.repeat(np.arange(n_nodes), np.diff(starts))
+            axis = (self._high[-1] - self._low[-1]).argmax(axis=1)[node]
+            self._order = self._order[np.lexsort((ordered[np.arange(len(points)), axis], node))]
+
+    def candidates(
+        self, roots: NDArray[np.intp], distance: float
+    ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """As those of _Cells: pairs whose boxes are near each other and do not have one root."""
+        limit = distance * distance * (1 + 1e-14) + 1e-300  # as in _within
+        last = len(self._starts) - 1
+        waiting = [(0, np.zeros(1, np.intp), np.zeros(1, np.intp))]
+        while waiting:
+            level, a, b = waiting.pop()
+            low, high, starts = self._low[level], self._high[level], self._starts[level]
+            gap = np.maximum(np.maximum(low[b] - high[a], low[a] - high[b]), 0.0)
+            of_node = roots[self._order]
+            least = np.minimum.reduceat(of_node, starts[:-1])
+            most = np.maximum.reduceat(of_node, starts[:-1])
+            one_root = (least[a] == most[a]) & (least[b] == most[b]) & (least[a] == least[b])
+            near = (np.einsum("ij,ij->i", gap, gap) <= limit) & ~one_root
+            a, b = a[near], b[near]
+            if level == last:
+                place = np.arange(_LEAF)
+                x, y = (starts[k][:, None] + place for k in (a, b))
+                there = (x < starts[a + 1][:, None])[:, :, None] & (y < starts[b + 1][:, None])[:, None, :]
+                x, y = np.broadcast_arrays(x[:, :, None], y[:, None, :])
+                yield self._order[x[there]], self._order[y[there]]
+                continue
+            a, b = np.tile(2 * a, 4), np.tile(2 * b, 4)
+            a[len(a) // 2 :] += 1
+            b.reshape(4, -1)[1::2] += 1
+            once = a <= b
+            a, b = a[once], b[once]
+            for at in range(0, len(a), _NODES_AT_ONCE):
+                waiting.append((level + 1, a[at : at + _NODES_AT_ONCE], b[at : at + _NODES_AT_ONCE]))
 
 
 def _key(cells: NDArray[np.float64]) -> NDArray[np.uint64]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hpccd_core as hc
+from hpccd_core.mesh_files import welding
 
 NO_FACES = np.empty((0, 3), np.uint32)
 
@@ -61,10 +62,15 @@ def scenes(random):
     clusters = random.normal(size=(4, 3))[random.integers(0, 4, n)]
     yield clusters + 0.01 * random.normal(size=(n, 3)), 0.05
     yield np.cumsum(np.full((n, 3), 0.5773502691896257), axis=0), 1.0  # a chain
+    layers = random.integers(0, 8, (2 * n, 3)) * [0.0625, 0.0625, 0] + [0, 0, 1] * random.integers(0, 3, (2 * n, 1))
+    yield layers * [1, 1, float(random.choice([1 - 2**-53, 1, 1 + 2**-52]))], 1.0
+    yield layers * [1, 1, 1.5] @ np.linalg.qr(random.normal(size=(3, 3)))[0], 1.49
 
 
+@pytest.mark.parametrize("dense", [16, 0], ids=["as_usual", "by_a_tree"])
 @pytest.mark.parametrize("seed", range(12))
-def test_equals_union_find_in_rational_arithmetic(seed):
+def test_equals_union_find_in_rational_arithmetic(seed, dense, monkeypatch):
+    monkeypatch.setattr(welding, "_DENSE", dense)
     random = np.random.default_rng(seed)
     for vertices, distance in scenes(random):
         check(vertices, random.integers(0, len(vertices), (2 * len(vertices), 3)), distance)
@@ -107,6 +113,16 @@ def test_time_grows_with_the_vertices_only(distance):
     welded, _, _ = hc.weld(doubled, NO_FACES, distance)
     assert time.process_time() - start < 10  # about 0.2 s; all pairs take minutes
     assert len(welded) == (len(vertices) if distance < 1e-3 else 1)
+
+
+@pytest.mark.parametrize("apart", [0.8, 0.500001], ids=["far", "just too far"])
+def test_clusters_that_remain_apart_do_not_compare_all_pairs(apart):
+    vertices, _ = hc.shapes.grid(149, 149)
+    layers = np.concatenate([0.75 * vertices, 0.75 * vertices + [0, 0, apart]])
+    start = time.process_time()
+    welded, _, _ = hc.weld(layers, NO_FACES, 0.5)
+    assert time.process_time() - start < 5  # about 0.3 s; 30 to 42 s as long as pairs of points were tested
+    assert len(welded) == 2
 
 
 @pytest.mark.parametrize(
