@@ -6,8 +6,9 @@
                                               the cheapest setting that is accurate enough for this recording
   hpccd bench accuracy run.mcap --picture trade.png
 
-Recordings are asked for plain contacts; separations that were set in the node are left out. The truth is that of the
-file; for scenes without it, the tier "exact", which the tests compare with rational arithmetic.
+Recordings are asked for plain contacts: separations, thickness, planes and ignored neighbours of the node are left out.
+The truth is that of the file; for scenes without it, the tier "exact", which the tests compare with rational
+arithmetic.
 
 --choose tests tiers, backends and the reports of --ask, prints all settings and names the cheapest one within the
 bounds, as it is written in a program or for the node. These may be bounded, as shares, the worst scene counting:

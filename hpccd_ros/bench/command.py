@@ -11,6 +11,7 @@ from pathlib import Path
 
 from hpccd_core.options import ACCURACIES
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import counted
 from hpccd_ros.bench import measure, sources
 from hpccd_ros.bench import report as output
 from hpccd_ros.bench.report import Report
@@ -104,7 +105,8 @@ def begin(args, resolve: Callable = sources.resolve) -> tuple[Report, list[sourc
             words += [f"--{name.replace('_', '-')}", shlex.quote(str(value))]
     report = Report(args.benchmark, " ".join(words), {**options, "sources": [source.name for source in found]})
     if args.repeat < FEWEST_ROUNDS:
-        report.note(f"only {args.repeat} timed rounds: take --repeat {FEWEST_ROUNDS} or more for numbers to rely on")
+        rounds = counted(args.repeat, "timed round")
+        report.note(f"only {rounds}: take --repeat {FEWEST_ROUNDS} or more for numbers to rely on")
     return report, found
 
 

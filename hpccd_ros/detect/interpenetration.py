@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 import numpy as np
 
@@ -42,31 +43,37 @@ class InterpenetrationDetector:
     """
 
     def __init__(self, builder: SceneBuilder, *, threads: int = 0, cancellation: Cancellation | None = None) -> None:
-        meshes = tuple(replace(mesh, ignored_at_rest=None) for mesh in builder.meshes)
         self._numbers = {mesh.name: number for number, mesh in enumerate(builder.meshes)}
         between_meshes = (pair for pair in builder.ignored_pairs if set(pair) <= self._numbers.keys())
-        self._builder = SceneBuilder(meshes, tuple(between_meshes))  # planes intersect nothing
+        self._builder = SceneBuilder(builder.meshes, tuple(between_meshes))  # planes intersect nothing
         self._options = {"outputs": ("points",), "backend": "cpu", "threads": threads}
         self._cancellation = cancellation or Cancellation()
         named = [(self._numbers[a], self._numbers[b]) for a, b in self._builder.pairs]
         self._pairs = np.array(named, np.int64).reshape(-1, 2)  # the lower number first
         self._topologies: tuple[Topology, ...] = ()
+        self._rest: list[np.ndarray | None] = []
         self._closed_meshes = ClosedMeshes()
         self._closed: np.ndarray | None = None
         self._surfaces: hc.Detector | None = None  # within meshes, too
         self._solids: hc.Detector | None = None  # made for the first depth
 
-    def intersections(self, topologies: tuple[Topology, ...], vertices: Sequence[np.ndarray]) -> hc.Intersections:
-        """The edges that intersect faces, with points. vertices: of each mesh. Raises the core's errors."""
-        self._prepare(topologies)
+    def intersections(
+        self,
+        topologies: tuple[Topology, ...],
+        vertices: Sequence[np.ndarray],
+        rest: Sequence[np.ndarray | None] = (),
+    ) -> hc.Intersections:
+        """The edges that intersect faces, with points. vertices: of each mesh. rest: as `SceneBuilder.build` takes it;
+        a mesh without a shape at rest is tested as if it had no ``ignored_at_rest``. Raises the core's errors."""
+        self._prepare(topologies, rest)
         return self._surfaces.intersections(_concatenated(vertices))
 
     def depths(
         self, topologies: tuple[Topology, ...], vertices: Sequence[np.ndarray], hits: hc.Intersections
     ) -> list[Depth]:
         """Of the pairs of different meshes that intersect in ``hits``, or of which one is inside the other, closed one.
-        Where mesh a is static, mesh b moves instead. Raises the core's errors."""
-        self._prepare(topologies)
+        Where mesh a is static, mesh b moves instead. hits: the last result of `intersections`. Raises the core's
+        errors."""
         x = _concatenated(vertices)
         solid = [number for number, topology in enumerate(topologies) if len(topology.faces)]
         a, b = (np.asarray(side, np.int64) for side in (hits.mesh_a, hits.mesh_b))
@@ -79,11 +86,17 @@ class InterpenetrationDetector:
         found = (self._depth(x, vertices, hits, pair) for pair in pairs)
         return [depth for depth in found if depth.length > 0]
 
-    def _prepare(self, topologies: tuple[Topology, ...]) -> None:
-        if self._surfaces is None or topologies != self._topologies:
-            scene = self._builder.build(topologies)
+    def _prepare(self, topologies: tuple[Topology, ...], rest: Sequence[np.ndarray | None]) -> None:
+        shapes = [t.rest if t.rest is not None else r for t, r in zip_longest(topologies, rest)]
+        same = all(a is b for a, b in zip_longest(shapes, self._rest))
+        if self._surfaces is None or topologies != self._topologies or not same:
+            meshes = tuple(
+                mesh if shape is not None else replace(mesh, ignored_at_rest=None)
+                for mesh, shape in zip(self._builder.meshes, shapes, strict=True)
+            )
+            scene = replace(self._builder, meshes=meshes).build(topologies, shapes)
             self._surfaces = self._cancellation.guard(hc.Detector(scene, **self._options))
-            self._topologies, self._solids, self._closed = topologies, None, None
+            self._topologies, self._rest, self._solids, self._closed = topologies, shapes, None, None
 
     def _prepare_solids(self) -> None:
         if self._solids is None:

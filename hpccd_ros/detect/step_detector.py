@@ -32,7 +32,8 @@ class Detection:
     of each pair of meshes at the end, if the options request it; ``gaps_backend``: the backend that computed them,
     which may differ; ``gaps_before``: those at the start, if they were requested then; ``gaps_approached``: of
     `approach.approached`. ``bounds``: of motions by poses
-    or joints. ``tested_pairs``: of the scene, as in SceneBuilder. ``rest_stamps``: as in RestShapes.
+    or joints. ``tested_pairs``: of the scene, as in SceneBuilder. ``rest``, ``rest_stamps``: as in
+    RestShapes.
     """
 
     start: SceneFrame
@@ -51,6 +52,7 @@ class Detection:
     gaps_approached: np.ndarray | None = None
     bounds: MotionBounds = NO_BOUNDS
     tested_pairs: Sequence[tuple[str, str]] = ()
+    rest: Sequence[np.ndarray | None] = ()
     rest_stamps: tuple[int, ...] = ()
 
     @property
@@ -204,5 +206,6 @@ class StepDetector:
             dict(stats),
             bounds=bounds,
             tested_pairs=self._builder.tested_pairs,
+            rest=self.rest.of(self._scene_of.topologies),
             rest_stamps=self._rest_stamps,
         )

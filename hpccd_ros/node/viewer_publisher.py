@@ -85,7 +85,7 @@ class ViewerPublisher:
         lines, depths = [], []
         if settings["markers_intersections"] or settings["markers_depth"]:
             scene = found.end.topologies, found.end.vertices
-            hits = search.intersections(*scene)
+            hits = search.intersections(*scene, found.rest)
             if settings["markers_intersections"]:
                 lines = polylines(hits.contours(), limit)
             if settings["markers_depth"]:

@@ -25,9 +25,15 @@ class IntersectingFaces:
         self.contours: list[hc.Contour] = []
         self.depths: list[Depth] = []
 
-    def of(self, topologies: tuple[Topology, ...], vertices: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """(F,) bool for each mesh: faces that an edge of another mesh intersects, or whose edge intersects one."""
-        hits = self._detector.intersections(topologies, vertices)
+    def of(
+        self,
+        topologies: tuple[Topology, ...],
+        vertices: Sequence[np.ndarray],
+        rest: Sequence[np.ndarray | None] = (),
+    ) -> list[np.ndarray]:
+        """(F,) bool for each mesh: faces that an edge of another mesh intersects, or whose edge intersects one. rest:
+        the shapes at rest that the topologies lack."""
+        hits = self._detector.intersections(topologies, vertices, rest)
         self.contours = hits.contours()
         self.depths = self._detector.depths(topologies, vertices, hits) if self._depth else []
         found = hits.ef[np.asarray(hits.mesh_a) != np.asarray(hits.mesh_b)]

@@ -112,7 +112,8 @@ def _marked(intersecting: IntersectingFaces, step: ReplayedStep, meshes) -> np.n
     """(F,) which of the drawn faces intersect another mesh; those of visual geometry do not."""
     names, topologies = step.layout.mesh_names, step.end_frame.topologies
     places = [vertices for _, vertices, *_ in meshes_in_the_middle(step)][: len(topologies)]
-    of_mesh = dict(zip(names, zip(topologies, intersecting.of(topologies, places), strict=True), strict=False))
+    marked = intersecting.of(topologies, places, step.rest)
+    of_mesh = dict(zip(names, zip(topologies, marked, strict=True), strict=False))
     return np.concatenate(
         [
             of_mesh[name][1] if name in of_mesh and of_mesh[name][0].faces is faces else np.zeros(len(faces), bool)

@@ -3,7 +3,9 @@
 
 import dataclasses
 from collections import Counter, deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+
+import numpy as np
 
 from hpccd_core.options import ACCURACIES, FEATURES, OUTPUTS
 from hpccd_ros.bag.decode import make_decoder
@@ -55,6 +57,7 @@ class ReplayedStep:
     separation: Separation = NONE  # in force
     thickness: Thickness = ()  # as well
     planes: tuple[PlaneSettings, ...] = ()
+    rest: Sequence[np.ndarray | None] = ()  # as in RestShapes
     features: tuple[str, ...] = FEATURES  # that were tested
     bounds: MotionBounds = NO_BOUNDS  # of motion by poses
     milliseconds: float = 0.0  # the core's call, wall time
@@ -348,7 +351,7 @@ class Replay:
         step.contacts, step.layout, step.milliseconds = found.contacts, found.layout, found.detect_ms
         step.bounds = found.bounds
         step.separation, step.features = found.options.separation, found.options.features
-        step.thickness = found.options.thickness
+        step.thickness, step.rest = found.options.thickness, found.rest
 
     def _lacks_rest(self, step) -> str | None:
         """Why the shapes at rest of a recorded result are unknown, or None: its start gives them, or they are known."""

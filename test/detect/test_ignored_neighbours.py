@@ -10,6 +10,7 @@ from waving_sheet import sheet_faces, sheet_positions
 
 import hpccd_core as hc
 from hpccd_ros.detect.core import Options
+from hpccd_ros.detect.interpenetration import InterpenetrationDetector
 from hpccd_ros.detect.rest_shapes import RestShapes
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.step_detector import StepDetector
@@ -92,3 +93,22 @@ def test_meshes_without_pairs_within_need_no_shape():
         ValueError, match=r"mesh.cloth.ignored_at_rest: the shape at rest is unknown here; give mesh.clo"
     ):
         SceneBuilder((CLOTH,)).build((SHEET,))
+
+
+def test_no_curve_is_drawn_along_a_seam_that_is_ignored():
+    panel, faces = hc.shapes.grid(4, 4)
+    vertices = np.vstack([panel, panel + [2, 0, 0]])
+    seam = Topology(5, len(vertices), np.vstack([faces, faces + len(panel)]))
+    moved = vertices * [1.0, 1.0, 0.5] + [0, 0, 3.0]
+    search = InterpenetrationDetector(SceneBuilder((replace(CLOTH, ignored_at_rest=0.0),)))
+    of_file = replace(seam, rest=vertices)
+    assert len(search.intersections((seam,), (moved,))) > 0  # the shape at rest is unknown
+    assert len(search.intersections((seam,), (moved,), (vertices,))) == 0
+    apart = vertices + np.repeat([[0, 0, 0], [0, 0, 1]], len(panel), axis=0)
+    assert len(search.intersections((seam,), (moved,), (apart,))) > 0
+    assert len(search.intersections((of_file,), (moved,))) == 0
+    found = StepDetector(SceneBuilder((replace(CLOTH, ignored_at_rest=0.0),)), Options(backend="cpu")).detect(
+        SceneFrame(0, 0, "", (seam,), (vertices,), ("cloth",), 0.0),
+        SceneFrame(1, 1, "", (seam,), (moved,), ("cloth",), 0.0),
+    )
+    assert len(search.intersections((seam,), (moved,), found.rest)) == 0

@@ -85,7 +85,7 @@ class RecordingPage:
         self._add_positions(step)
         marked, contours, depths = [np.empty(0, bool)] * len(self._meshes), [], []
         if self._intersecting is not None and step.end_frame is not None:
-            marked = self._intersecting.of(step.end_frame.topologies, step.end_frame.vertices)
+            marked = self._intersecting.of(step.end_frame.topologies, step.end_frame.vertices, step.rest)
             contours, depths = self._drawn(self._intersecting.contours), self._drawn(self._intersecting.depths)
         drawn = (0, 0) if step.contacts is None else self._contacts.add(step.contacts, step.layout)
         self._steps.append(
