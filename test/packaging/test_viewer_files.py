@@ -4,12 +4,27 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
+from builtin_interfaces.msg import Time
 from waving_sheet import sheet_faces, sheet_positions
 
+from hpccd_ros.detect.scene import PlaneSettings
+from hpccd_ros.node import markers
+
 CONFIG = Path(__file__).resolve().parents[2] / "config"
-NAMESPACES = {"vertex_face", "edge_edge", "normals", "near", "intersections", "depth"}
+OF_ALL = {"stamp": Time(), "frame_id": ""}
+NONE = np.empty((0, 3))
+NAMESPACES = {
+    marker.ns
+    for marker in (
+        *markers.contact_markers(NONE, NONE, NONE, 0, size=1.0, limit=1, **OF_ALL).markers,
+        *markers.plane_markers([PlaneSettings("floor")], [NONE], **OF_ALL),
+        markers.intersection_marker([], size=1.0, **OF_ALL),
+        *markers.depth_markers([], size=1.0, count=1, **OF_ALL),
+    )
+}
 CLASSES = {"PointCloud2": "sensor_msgs/msg/PointCloud2", "MarkerArray": "visualization_msgs/msg/MarkerArray"}
 
 
@@ -49,8 +64,8 @@ def test_rviz(published):
         kind = CLASSES[display["Class"].rpartition("/")[2]]
         assert topics[display["Topic"]["Value"]] == kind and display["Enabled"]
         assert display["Topic"]["Reliability Policy"] == "Reliable"
-    (markers,) = (display for display in shown if "Namespaces" in display)
-    assert markers["Namespaces"].keys() == NAMESPACES
+    (of_markers,) = (display for display in shown if "Namespaces" in display)
+    assert of_markers["Namespaces"].keys() == NAMESPACES
     assert tree["Global Options"]["Fixed Frame"]
 
 
