@@ -37,9 +37,8 @@ class Contacts(PairsOfWorlds, WithSides):
     """Contacts of one step in canonical order: N vertex-face rows, then M edge-edge rows.
 
     :meth:`Detector.detect` and :meth:`Detector.step` return it. ``len(contacts)`` is the number of rows of all kinds.
-    Scenes with planes, points or ropes have further kinds, whose rows follow in all outputs in the order `vp`, `vv`,
-    `ve`. Two results are equal if
-    all their arrays are; they are not hashable: use `hash` as a key.
+    Scenes with planes or points have further kinds, whose rows follow in all outputs in the order `vp`, `vv`, `ve`. Two
+    results are equal if all their arrays are; they are not hashable: use `hash` as a key.
 
     Attributes
     ----------

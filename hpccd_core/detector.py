@@ -448,7 +448,7 @@ class Detector(
 
         Notes
         -----
-        The plane does not move during a step: for one that moves, give the place that leaves less room.
+        The plane does not move during a step: give its start or its end, whichever leaves less room.
         """
         number = arguments.mesh_number("plane", plane, self._mesh_numbers)
         if number not in self._layout.planes:

@@ -22,11 +22,12 @@ _NOT_GIVEN: ArrayLike = ()
 
 
 class Scene:
-    """Meshes of triangles and of segments with fixed topology, and which pairs of them are tested.
+    """Meshes of triangles, segments and points with fixed topology, planes, and which pairs of them are tested.
 
     Vertices and faces are numbered across the scene, in the order in which meshes were added. Model only what the
     application requires: ``self_collision=False`` for bodies that keep their shape, ``static=True`` for meshes that
-    never move, :meth:`ignore_pair` for pairs that cannot or may touch. A scene can be pickled and copied.
+    never move, :meth:`add_plane` for floors and walls, :meth:`ignore_pair` and :meth:`ignore_within` for pairs that
+    cannot or may touch. A scene can be pickled and copied.
 
     Examples
     --------
@@ -69,7 +70,7 @@ class Scene:
             Segments beside the edges of the faces, as of a rope. A segment that occurs twice counts once.
         n_vertices : int, optional
             Number of vertices; by default the largest index + 1. Give it if trailing vertices are in no face and no
-            edge; such vertices are tested against faces.
+            edge; such vertices are tested against faces only (:meth:`add_points`: against each other, too).
         self_collision : bool
             Whether contacts within the mesh are reported.
         static : bool
@@ -293,8 +294,8 @@ class Scene:
     ) -> None:
         """Never report contacts between neighbouring features of one mesh.
 
-        For cloth whose separation, or thickness, is larger than its edges: without a filter all neighbours would be in
-        contact for ever. Give `rings`, or `rest_vertices` and `distance`; several calls add up.
+        For cloth whose separation and thickness exceed the smallest gap between its neighbours, which are then always
+        in contact. Give `rings`, or `rest_vertices` and `distance`; several calls add up.
 
         Parameters
         ----------
@@ -317,10 +318,10 @@ class Scene:
 
         Notes
         -----
-        Ignored pairs count nowhere: not in contacts, proximity and intersections, not in steps and motions, and not in
-        `Detector.distances` within the mesh, which is the smallest distance of the pairs that remain. Doubled vertices
-        are not joined by an edge: see :meth:`Detector.distances` for what is found between them, or use a rest filter
-        with distance 0. Rest filters take one search by :class:`Detector` when it is made.
+        Ignored pairs count nowhere: not in contacts, proximity, intersections, steps and motions. `Detector.distances`
+        returns the smallest distance of the pairs that remain: with the positions at rest it shows whether a filter is
+        wide enough. Doubled vertices are not joined by an edge: join them with :func:`hpccd_core.weld`, or use a rest
+        filter with distance 0. :class:`Detector` searches for the pairs of rest filters once, when it is made.
 
         Examples
         --------
@@ -588,7 +589,7 @@ class Scene:
 
     def __repr__(self) -> str:
         n_edges = self._core.n_edges
-        edges = f", {n_edges} edges beside" if n_edges else ""
+        edges = f", {n_edges} edges in no face" if n_edges else ""
         return f"Scene({', '.join(self._ids)}: {self.n_vertices} vertices, {self.n_faces} faces{edges})"
 
 
