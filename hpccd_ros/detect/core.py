@@ -10,8 +10,9 @@ import numpy as np
 import hpccd_core as hc
 from hpccd_core.options import FEATURES
 from hpccd_ros.detect.rigid_step import RigidOptions
+from hpccd_ros.detect.scene import add_to
 from hpccd_ros.detect.separation import NONE, Separation, Thickness, change_thickness
-from hpccd_ros.frames.types import Topology
+from hpccd_ros.frames.types import MeshSettings, Topology
 
 
 class Cancellation:
@@ -122,10 +123,10 @@ def unusable_options(options: Options) -> str | None:
     return None
 
 
-def unusable_topology(topology: Topology) -> str | None:
-    """Why the core cannot use this topology, or None."""
+def unusable_topology(topology: Topology, mesh: str = "mesh", points: bool = False) -> str | None:
+    """Why the core cannot use this topology, or None. points: the mesh is in parameter ``points``."""
     try:
-        hc.Scene().add_mesh("mesh", topology.faces, edges=topology.edges, n_vertices=topology.n_vertices)
+        add_to(hc.Scene(), MeshSettings(mesh, points=points), topology)
     except CORE_ERRORS as error:
         return str(error)
     return None

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 import hpccd_core as hc
+from hpccd_ros.base.quoting import counted
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.frames.types import MeshSettings, SceneFrame, Topology
 
@@ -20,6 +21,21 @@ class PlaneSettings:
     name: str
     normal: tuple[float, ...] = (0.0, 0.0, 1.0)
     offset: float = 0.0
+
+
+def add_to(scene: hc.Scene, mesh: MeshSettings, topology: Topology) -> None:
+    """Add a mesh to a scene. Raises the core's errors, and ValueError for triangles of a mesh in parameter
+    ``points``."""
+    how = {"edges": topology.edges, "self_collision": mesh.self_collision, "static": mesh.static}
+    if not mesh.points:
+        scene.add_mesh(mesh.name, topology.faces, n_vertices=topology.n_vertices, **how)
+    elif len(topology.faces):
+        raise ValueError(
+            f"faces: {counted(len(topology.faces), 'triangle')} in a mesh of points; send none, or take {mesh.name} "
+            "out of parameter points"
+        )
+    else:
+        scene.add_points(mesh.name, topology.n_vertices, **how)
 
 
 @dataclass(frozen=True)
@@ -38,14 +54,7 @@ class SceneBuilder:
         the core's errors, and ValueError for a mesh whose shape at rest is needed and unknown."""
         scene = hc.Scene()
         for mesh, topology in zip(self.meshes, topologies, strict=True):
-            scene.add_mesh(
-                mesh.name,
-                topology.faces,
-                edges=topology.edges,
-                n_vertices=topology.n_vertices,
-                self_collision=mesh.self_collision,
-                static=mesh.static,
-            )
+            add_to(scene, mesh, topology)
         for plane in self.planes:
             scene.add_plane(plane.name, plane.normal, plane.offset)
         for number, (mesh, topology) in enumerate(zip(self.meshes, topologies, strict=True)):

@@ -25,7 +25,8 @@ OUTDATED = -1
 
 @dataclass(frozen=True)
 class MeshSettings:
-    """Settings of a mesh (parameters ``mesh.NAME.*``). ``input``: "" if it does not matter."""
+    """Settings of a mesh (parameters ``mesh.NAME.*``). ``input``: "" if it does not matter. ``points``: in parameter
+    ``points``."""
 
     name: str
     static: bool = False
@@ -37,6 +38,7 @@ class MeshSettings:
     whole: bool = False  # each message with vertices contains the topology
     ignored_rings: int = 0
     ignored_at_rest: float | None = None
+    points: bool = False
 
     @property
     def rigid(self) -> bool:

@@ -186,7 +186,7 @@ class TopologySubscription(MeshTopic):
         except InvalidMessageError as error:
             self.reject(error.reason, str(error))
             return
-        if why := unusable_topology(topology):
+        if why := unusable_topology(topology, of.mesh, of.mesh in of.settings["points"]):
             self.reject(Reason.BAD_TOPOLOGY, why)
             return
         self.taken(info["source_timestamp"], new_publisher)

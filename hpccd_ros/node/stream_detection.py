@@ -2,7 +2,7 @@
 """From the topics of the meshes to detections: connects subscriptions, pipeline and detection thread."""
 
 import itertools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
 from rclpy.node import Node
@@ -53,7 +53,7 @@ class StreamDetection:
         accounts.heard.clear()
         self._restart_after = settings["restart_after"]
         self._pipeline, self._by_joints = self._made()
-        accounts.add(_load_files(self._pipeline, meshes))
+        accounts.add(_load_files(self._pipeline, meshes, settings["points"]))
         self._subscriptions = Subscriptions(node, settings, meshes)
         self._thread: DetectionThread | None = None
         self._on_detection: Callable[[Detection], None] = lambda found: None
@@ -260,14 +260,15 @@ class Subscriptions:
         return list(itertools.islice((line for part in parts for line in part.silent()), _MOST_SILENT))
 
 
-def _load_files(pipeline: FramePipeline, meshes: dict[str, dict[str, Any]]) -> Outcome:
-    """Read them into the pipeline. meshes: name -> parameters mesh.NAME.*. Raises MeshFileError."""
+def _load_files(pipeline: FramePipeline, meshes: dict[str, dict[str, Any]], points: Collection[str]) -> Outcome:
+    """Read them into the pipeline. meshes: name -> parameters mesh.NAME.*. points: that parameter. Raises
+    MeshFileError."""
     outcome = Outcome()
     for name, mesh in meshes.items():
         if mesh["file"]:
             vertices, faces = load_mesh(resources.local_path(mesh["file"]))
             topology, positions = mesh_of_file(vertices, faces, mesh)
-            if why := unusable_topology(topology):
+            if why := unusable_topology(topology, name, name in points):
                 raise MeshFileError(f"mesh.{name}.file {mesh['file']}: {why}")
             outcome += pipeline.load(name, topology, positions)
     return outcome

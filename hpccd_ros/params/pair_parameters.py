@@ -136,10 +136,9 @@ def separation(settings: dict[str, Any], links: Links = NO_LINKS) -> Separation:
 
 def stop_detail(settings: dict[str, Any], links: Links = NO_LINKS) -> tuple[tuple[str, float], ...]:
     """Parameter ``stop_detail`` as (mesh name, ratio). Raises ParameterError."""
-    if settings["stop_detail"] and settings["planes"]:
-        raise ParameterError(
-            "stop_detail: is not offered with planes; leave one of both out, or use a mesh as the floor"
-        )
+    for parameter, instead in (("planes", ", or use a mesh as the floor"), ("points", "")):
+        if settings["stop_detail"] and settings[parameter]:
+            raise ParameterError(f"stop_detail: is not offered with {parameter}; leave one of both out{instead}")
     if settings["stop_detail"] and importlib.util.find_spec("fast_simplification") is None:
         raise ParameterError("stop_detail: needs the package fast-simplification; run pip install fast-simplification")
     return _of_meshes(settings, links, "stop_detail", "RATIO", "a ratio above 0 and below 1", lambda x: 0 < x < 1)

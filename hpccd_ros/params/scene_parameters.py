@@ -7,7 +7,7 @@ from typing import Any
 
 from hpccd_core.options import FEATURES, OUTPUTS
 from hpccd_core.rigid.transform import Rigid
-from hpccd_ros.base.quoting import quoted, shortened
+from hpccd_ros.base.quoting import listed, quoted, shortened, suggestion
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.rigid_step import RigidOptions
 from hpccd_ros.detect.scene import PlaneSettings, SceneBuilder
@@ -29,7 +29,7 @@ def scene_builder(settings: dict[str, Any], meshes: MeshValues, robots: Robots =
     links = robot_parameters.links(robots)
     by_default = [pair for name in settings[ROBOT] if name in robots for pair in robots[name].ignored_pairs]
     return SceneBuilder(
-        mesh_settings(meshes) + robot_parameters.mesh_settings(settings, robots),
+        mesh_settings(settings, meshes) + robot_parameters.mesh_settings(settings, robots),
         pair_parameters.ignored_pairs(settings, links, by_default),
         pair_parameters.pair_accuracies(settings, links),
         pair_parameters.pair_features(settings, links),
@@ -50,7 +50,7 @@ def planes(settings: dict[str, Any]) -> tuple[PlaneSettings, ...]:
     return tuple(PlaneSettings(name, tuple(of["normal"]), of["offset"]) for name, of in settings[PLANE].items())
 
 
-def mesh_settings(meshes: MeshValues) -> tuple[MeshSettings, ...]:
+def mesh_settings(settings: dict[str, Any], meshes: MeshValues) -> tuple[MeshSettings, ...]:
     """In the order of parameter ``meshes``."""
     return tuple(
         MeshSettings(
@@ -64,6 +64,7 @@ def mesh_settings(meshes: MeshValues) -> tuple[MeshSettings, ...]:
             whole=of["input"] in WHOLE,
             ignored_rings=of["ignored_rings"],
             ignored_at_rest=of["ignored_at_rest"] if of["ignored_at_rest"] >= 0 else None,
+            points=name in settings["points"],
         )
         for name, of in meshes.items()
     )
@@ -86,7 +87,7 @@ def frame_pipeline(
         frame_id=settings["frame_id"],
     )
     of_robots = robot_parameters.mesh_settings(settings, robots)
-    pipeline = FramePipeline(mesh_settings(meshes) + of_robots, rules, tuple(followers))
+    pipeline = FramePipeline(mesh_settings(settings, meshes) + of_robots, rules, tuple(followers))
     for robot in robots.values():
         for mesh in robot.meshes:
             pipeline.load(mesh.name, mesh.topology, MeshFrame(0, mesh.vertices, version=mesh.topology.version))
@@ -147,6 +148,7 @@ def check(settings: dict[str, Any], meshes: MeshValues, robots: Robots = NO_ROBO
     robot_parameters.check(settings)
     features(settings)
     planes(settings)
+    _check_points(settings, meshes)
     poses(meshes)
     # The links of an unknown robot are unknown.
     if set(settings["robots"]) <= set(robots):
@@ -188,6 +190,19 @@ def check_stop(settings: dict[str, Any], builder: SceneBuilder) -> None:
             "stop_distance: no two different meshes are tested against each other, so nothing could ever be near; name "
             "two in meshes of which one moves and that ignored_pairs does not name, or leave stop_distance negative"
         )
+
+
+def _check_points(settings: dict[str, Any], meshes: MeshValues) -> None:
+    for name in settings["points"]:
+        if name not in meshes:
+            raise ParameterError(
+                f"points: {quoted(name)} must be a mesh out of {listed(meshes) or '(none)'}{suggestion(name, meshes)}"
+            )
+        if meshes[name]["input"] in WHOLE:
+            raise ParameterError(
+                f"points: {name} has no triangles, and with mesh.{name}.input {meshes[name]['input']} each message "
+                f"carries them; set mesh.{name}.input to vertices or points, or leave {name} out"
+            )
 
 
 def _check_filters(name: str, values: dict[str, Any]) -> None:

@@ -73,6 +73,15 @@ SCENE_ROWS = (
         example=["floor"],
     ),
     Row(
+        "points",
+        "string[]",
+        [],
+        "Those of `meshes` that are points, without triangles: with `thickness` vertices are spheres and edges "
+        "capsules, tested against all meshes. In other meshes, vertices in no edge and no triangle are tested against "
+        "triangles only",
+        example=["grains"],
+    ),
+    Row(
         "ignored_pairs",
         "string[]",
         [],

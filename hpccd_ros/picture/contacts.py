@@ -19,7 +19,7 @@ from hpccd_ros.detect.interpenetration import Depth
 from hpccd_ros.picture import curves
 from hpccd_ros.picture.camera import Camera
 from hpccd_ros.picture.raster import rasterize
-from hpccd_ros.picture.shading import RADIUS, shade, tubes
+from hpccd_ros.picture.shading import RADIUS, beads, shade, tubes
 from hpccd_ros.picture.tint import Tint
 
 BACKGROUND = "#10141c"
@@ -131,10 +131,13 @@ def render(meshes, size, azimuth, elevation, contacts=None, intersecting=None, f
     )
     paint = _paint(vertices, faces, contacts, intersecting)
     extent = float(np.ptp(vertices, axis=0).max())
-    around, sides, coloured_as = tubes(vertices, edges, RADIUS * extent)
     first, last = (sum(len(mesh[2]) for mesh in meshes[:count]) for count in (len(meshes) - planes, len(meshes)))
-    faces = np.concatenate([faces, sides + len(vertices)])
-    vertices, colours = np.concatenate([vertices, around]), np.concatenate([colours, colours[coloured_as]])
+    for around, sides, coloured_as in (
+        tubes(vertices, edges, RADIUS * extent),
+        beads(vertices, alone(meshes, sizes), 2 * RADIUS * extent),
+    ):
+        faces = np.concatenate([faces, sides + len(vertices)])
+        vertices, colours = np.concatenate([vertices, around]), np.concatenate([colours, colours[coloured_as]])
     large = (size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING)
     camera = Camera(vertices if framed is None else framed, large, azimuth, elevation)
     casting = np.delete(faces, slice(first, last), axis=0)
@@ -158,6 +161,12 @@ def render(meshes, size, azimuth, elevation, contacts=None, intersecting=None, f
     alpha = shaded[..., 3:]
     rgb = srgb(np.clip(shaded[..., :3] / np.maximum(alpha, 1e-9), 0, 1))
     return np.concatenate([rgb, alpha], axis=2), camera, buffers.depth
+
+
+def alone(meshes, sizes):
+    """Vertices in no edge, of meshes without faces."""
+    alone = [np.setdiff1d(np.arange(0 if len(faces) else len(v)), edges) for _, v, faces, edges in meshes]
+    return scene_indices(alone, sizes)
 
 
 def scene_indices(indices, sizes):
@@ -189,7 +198,7 @@ def _paint(vertices, faces, contacts, intersecting):
     """The argument `paint` of `shade`."""
     points, toc = contacts or (np.empty((0, 3)), np.empty(0))
     tint = Tint(np.asarray(points, np.float64).reshape(-1, 3), toc_colours(toc), vertices)
-    # The last one is that of all further triangles: tubes around edges.
+    # The last one is that of all further triangles: tubes around edges, and beads.
     marked = np.append(np.zeros(len(faces), bool) if intersecting is None else intersecting, False)
 
     def paint(position, triangle, own):

@@ -148,3 +148,12 @@ def tubes(vertices: np.ndarray, edges: np.ndarray, radius: float) -> tuple[np.nd
     quads = np.concatenate([np.stack([low, next_low, high], 1), np.stack([high, next_low, next_low + SIDES], 1)])
     faces = quads + 2 * SIDES * np.arange(len(edges))[:, None, None]
     return positions.reshape(-1, 3), faces.reshape(-1, 3), np.repeat(edges.reshape(-1), SIDES)
+
+
+def beads(vertices: np.ndarray, numbers: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Octahedra around some of the vertices, as `tubes` returns them. numbers: (N,), indices of these vertices."""
+    corners = radius * np.concatenate([np.eye(3), -np.eye(3)])
+    octants = [[x, y, z] if (x + y + z) % 2 else [y, x, z] for x in (0, 3) for y in (1, 4) for z in (2, 5)]
+    faces = np.array(octants) + len(corners) * np.arange(len(numbers))[:, None, None]
+    positions = vertices[numbers][:, None] + corners
+    return positions.reshape(-1, 3), faces.reshape(-1, 3), np.repeat(numbers, len(corners))

@@ -53,6 +53,12 @@ def test_markers_show_nearest_points_of_thick_meshes():
     assert scene_parameters.detector_options(settings).outputs == ("points", "normals", "closest")
 
 
+def test_points():
+    assert [mesh.points for mesh in builder(points=["ball"]).meshes] == [False, True]
+    settings, meshes = checked(points=["ball"], mesh__ball__input="points")
+    assert scene_parameters.mesh_settings(settings, meshes)[1].points
+
+
 def test_meshes():
     cloth, ball = builder(mesh__cloth__ignored_rings=2, mesh__cloth__ignored_at_rest=0.0).meshes
     assert (cloth.ignored_rings, cloth.ignored_at_rest) == (2, 0.0)
@@ -87,6 +93,13 @@ def test_meshes():
             "'cloth:1.5' must be NAME:RATIO with a mesh out of cloth, ball and a ratio above 0",
         ),
         ({"stop_detail": ["cloth:0.1"], "planes": ["floor"]}, "stop_detail: is not offered with planes"),
+        ({"stop_detail": ["cloth:0.1"], "points": ["ball"]}, "stop_detail: is not offered with points"),
+        ({"points": ["bal"]}, "points: 'bal' must be a mesh out of cloth, ball; did you mean ball?"),
+        ({"planes": ["floor"], "points": ["floor"]}, "points: 'floor' must be a mesh out of cloth, ball"),
+        (
+            {"points": ["ball"], "mesh__ball__input": "marker"},
+            "with mesh.ball.input marker each message carries them; set mesh.ball.input to vertices or points",
+        ),
         ({"planes": ["floor"], "thickness": ["floor:1"]}, "'floor' is a plane, which has none: shift its offset"),
         ({"mesh__cloth__ignored_rings": -1}, "mesh.cloth.ignored_rings: -1 is outside 0 .. 1000"),
         (

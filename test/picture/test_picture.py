@@ -18,7 +18,7 @@ from hpccd_ros.picture.camera import Camera
 from hpccd_ros.picture.intersecting import IntersectingFaces
 from hpccd_ros.picture.of_recording import separation_fact
 from hpccd_ros.picture.raster import rasterize
-from hpccd_ros.picture.shading import blur, tubes, vertex_normals
+from hpccd_ros.picture.shading import beads, blur, tubes, vertex_normals
 
 
 def _nearest_by_hand(corners, x, y):
@@ -132,6 +132,20 @@ def test_edges_are_drawn_as_tubes_around_them():
     rope = ("rope", np.array([[-1, 0, 0], [0, 0.5, 0], [1, 0, 0.0]]), np.empty((0, 3), int), np.array([[0, 1], [1, 2]]))
     image, *_ = contacts.render([rope], (320, 200), -60, 26)
     assert 0.002 < (image[..., 3] > 0.5).mean() < 0.1
+
+
+def test_points_are_drawn_as_beads_around_them():
+    points = np.random.default_rng(11).normal(size=(9, 3))
+    around, faces, coloured_as = beads(points, np.array([2, 5]), 0.1)
+    assert coloured_as.tolist() == [2] * 6 + [5] * 6
+    assert np.allclose(np.linalg.norm(around - points[coloured_as], axis=1), 0.1)
+    a, b, c = (around[faces[:, i]] for i in range(3))
+    outside = np.einsum("nx,nx->n", np.cross(b - a, c - a), a - points[coloured_as[faces[:, 0]]])
+    assert len(faces) == 16 and (outside > 0).all()
+    # A point beside a rope; vertices that a mesh with triangles does not use are not drawn.
+    grains = ("grains", np.array([[-1, 0, 0], [0, 0.5, 0], [1, 0, 0.0]]), np.empty((0, 3), int), np.array([[0, 1]]))
+    mesh = ("mesh", np.array([[-1, 0, 0], [0, 0.5, 0], [1, 0, 0], [3, 0, 0]]), np.array([[0, 1, 2]]), NO_EDGES)
+    assert contacts.alone([grains, mesh], [3, 4]).tolist() == [2]
 
 
 def test_contacts_are_drawn_where_they_project_to_in_the_colour_of_their_time():
