@@ -55,7 +55,10 @@ def _set(node: Node, remote: str, args, stop: Sequence) -> None:
     )
     (result,) = response.results
     if not result.successful:
-        raise UserError(f"not set: {result.reason or f'{remote} gives no reason'}")
+        reason = result.reason or f"{remote} gives no reason"
+        if reason.startswith("Trying to set a read-only parameter"):  # rclpy
+            reason = f"{args.name}: read-only; give it when the node starts"
+        raise UserError(f"not set: {reason}")
     print(f"{args.name}: {_yaml(value)}")
 
 

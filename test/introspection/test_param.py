@@ -46,7 +46,7 @@ def test_set(param, name, given, shown):
     "arguments, says",
     [
         (("set", "accuracy", "exakt"), "not set: accuracy: 'exakt' is "),
-        (("set", "meshes", "[net]"), "not set: "),
+        (("set", "meshes", "[net]"), "not set: meshes: read-only; give it when the node starts"),
         (("set", "threads", "-1"), "not set: "),
         (("set", "threads", "99999999999999999999"), "not set: threads: expected int, got float; "),
         (("set", "accuracy", "5"), "not set: accuracy: expected string, got int; write, for example, 'exact'"),
