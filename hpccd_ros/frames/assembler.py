@@ -33,6 +33,7 @@ from hpccd_ros.frames.matching import ExactMatcher, Match, Matcher, NearestMatch
 from hpccd_ros.frames.restart import CoordinateFrame, Restart, StampOrder
 from hpccd_ros.frames.topology_version import TopologyHistory, check_frame, check_successor, is_early, rejected_topology
 from hpccd_ros.frames.types import (
+    NO_FACES,
     OUTDATED,
     AssemblyRules,
     MeshFrame,
@@ -183,6 +184,9 @@ class FrameAssembler:
         return Outcome(rejections=[Rejection(mesh, Reason.UNKNOWN_MESH, text, what=what)])
 
     def _admit(self, state: _MeshState, frame: MeshFrame) -> Outcome:
+        if state.whole and frame.topology is None:  # a cloud of points
+            n = len(frame.vertices)
+            frame = frame.of_topology(Topology(n, n, NO_FACES, sent=frame.sent))
         if frame.topology is not None:
             topology = state.topologies.same_as(frame.topology)
         elif is_early(frame, state.topologies.current):

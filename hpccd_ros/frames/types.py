@@ -35,7 +35,7 @@ class MeshSettings:
     frame: str = ""
     pose: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
     input: str = ""
-    whole: bool = False  # each message with vertices contains the topology
+    whole: bool = False  # each message with vertices contains the topology, or is a cloud of all points of a mesh
     ignored_rings: int = 0
     ignored_at_rest: float | None = None
     points: bool = False
@@ -64,6 +64,8 @@ class AssemblyRules:
 
 NO_EDGES = np.empty((0, 2), np.uint32)
 NO_EDGES.flags.writeable = False
+NO_FACES = np.empty((0, 3), np.uint32)
+NO_FACES.flags.writeable = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,6 +52,12 @@ def positions(given_as: str) -> tuple[str, ...]:
     return {POSE: (POSE, VERTICES), BY_TRANSFORMS: (VERTICES,)}.get(given_as, (given_as,))
 
 
+def is_whole(given_as: str, points: bool) -> bool:
+    """Whether each message with positions of a mesh contains its topology: a cloud has all of a mesh of points
+    (parameter ``points``)."""
+    return given_as in WHOLE or (points and given_as == POINTS)
+
+
 # A mesh name becomes part of topic and parameter names.
 MESH_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 

@@ -265,12 +265,12 @@ class MeshSubscriptions:
         self._reception = reception
         self._by_file = bool(values["file"])
         # Kinds of which one message is enough; the topology comes with each message of a whole mesh.
-        self._once = set() if given_as in topic_names.WHOLE else {topic_names.TOPOLOGY}
+        self._whole = topic_names.is_whole(given_as, reception.mesh in reception.settings["points"])
+        self._once = set() if self._whole else {topic_names.TOPOLOGY}
         if given_as in (topic_names.POSE, topic_names.BY_TRANSFORMS):
             self._once.add(topic_names.VERTICES)
         elif values["static"]:
             self._once.add(given_as)
-        self._whole = given_as in topic_names.WHOLE
         self.topics: list[MeshTopic] = []
         self.topics.append(TopologySubscription(reception))
         self._positions = [PositionsSubscription(reception, kind) for kind in topic_names.positions(given_as)]

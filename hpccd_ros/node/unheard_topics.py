@@ -2,7 +2,7 @@
 """Topics of meshes that no node subscribes to because of their name, such as mesh/cloth/vertices in place of
 meshes/cloth/vertices."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 from rclpy.node import Node
@@ -22,7 +22,7 @@ _NEAR = 0.7
 class UnheardTopics:
     """meshes: name -> parameters mesh.NAME.*. `look` about once a second; ``warnings``: one line a topic."""
 
-    def __init__(self, node: Node, meshes: Mapping[str, Mapping[str, Any]]) -> None:
+    def __init__(self, node: Node, meshes: Mapping[str, Mapping[str, Any]], points: Collection[str]) -> None:
         self._node = node
         self._namespace = f"{node.get_namespace().rstrip('/')}/"
         # Full name -> type, of the topics on which messages must come.
@@ -35,7 +35,7 @@ class UnheardTopics:
                 for kind in (topic_names.TOPOLOGY, *topic_names.POSITIONS)
             }
             used = topic_names.positions(values["input"])
-            for kind in _needed(values):
+            for kind in _needed(values, mesh in points):
                 self._expected[topics[kind]] = mesh_inputs.TYPE_NAMES[kind]
             for kind in set(topic_names.POSITIONS) - set(used):
                 self._other_inputs[topics[kind]] = mesh, kind, topics[used[0]]
@@ -89,8 +89,8 @@ class UnheardTopics:
         return any(graph.detects(self._node, endpoint.node_name, endpoint.node_namespace) for endpoint in found)
 
 
-def _needed(values: Mapping[str, Any]) -> list[str]:
-    """Kinds of topics on which a mesh with these parameters needs a message."""
+def _needed(values: Mapping[str, Any], points: bool) -> list[str]:
+    """Kinds of topics on which a mesh with these parameters needs a message. points: it is in that parameter."""
     given_as, by_file = values["input"], bool(values["file"])
     shape_alone = given_as in (topic_names.POSE, topic_names.BY_TRANSFORMS)
     positions = [
@@ -98,4 +98,4 @@ def _needed(values: Mapping[str, Any]) -> list[str]:
         for kind in topic_names.positions(given_as)
         if not (by_file and (values["static"] or (shape_alone and kind == topic_names.VERTICES)))
     ]
-    return positions if by_file or given_as in topic_names.WHOLE else [topic_names.TOPOLOGY, *positions]
+    return positions if by_file or topic_names.is_whole(given_as, points) else [topic_names.TOPOLOGY, *positions]

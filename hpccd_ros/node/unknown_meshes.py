@@ -51,7 +51,7 @@ class UnknownMeshWatch:
         self, node: Node, settings: dict[str, Any], meshes: Mapping[str, Mapping[str, Any]], accounts: Accounts
     ) -> None:
         self._node = node
-        self._unheard = UnheardTopics(node, meshes)
+        self._unheard = UnheardTopics(node, meshes, settings["points"])
         self._known = list(settings["meshes"])
         self._accounts = accounts
         self._count = settings["count_unknown_meshes"]

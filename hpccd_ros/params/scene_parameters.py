@@ -15,7 +15,7 @@ from hpccd_ros.detect.separation import NONE
 from hpccd_ros.frames.follower import Follower
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.types import POSE, TF, AssemblyRules, MeshFrame, MeshSettings
-from hpccd_ros.middleware.topic_names import WHOLE
+from hpccd_ros.middleware.topic_names import POINTS, WHOLE, is_whole
 from hpccd_ros.params import pair_parameters, robot_parameters
 from hpccd_ros.params.robot_parameters import NO_ROBOTS, Robots
 from hpccd_ros.params.table import FARTHEST, PLANE, ROBOT
@@ -61,7 +61,7 @@ def mesh_settings(settings: dict[str, Any], meshes: MeshValues) -> tuple[MeshSet
             of["frame"],
             tuple(of["pose"]),
             of["input"],
-            whole=of["input"] in WHOLE,
+            whole=is_whole(of["input"], name in settings["points"]),
             ignored_rings=of["ignored_rings"],
             ignored_at_rest=of["ignored_at_rest"] if of["ignored_at_rest"] >= 0 else None,
             points=name in settings["points"],
@@ -155,10 +155,10 @@ def check(settings: dict[str, Any], meshes: MeshValues, robots: Robots = NO_ROBO
         check_stop(settings, scene_builder(settings, meshes, robots))
     for name, values in meshes.items():
         _check_filters(name, values)
-        if values["file"] and values["input"] in WHOLE:
+        if values["file"] and is_whole(values["input"], name in settings["points"]):
+            what = "is the whole mesh" if values["input"] == POINTS else "carries the triangles"
             raise ParameterError(
-                f"mesh.{name}.file: with mesh.{name}.input {values['input']} each message carries the triangles; leave "
-                "one of them out"
+                f"mesh.{name}.file: with mesh.{name}.input {values['input']} each message {what}; leave one of them out"
             )
         if values["input"] in (POSE, TF):
             _check_rigid(name, values, settings)

@@ -162,7 +162,8 @@ def missing_shapes(parameters: dict, resolve: Callable[[str], str], received: Ma
 def _missing(mesh: str, parameters: dict, came: Callable[[str], bool]) -> list[str]:
     """Topics of ``mesh`` on which its shape should have arrived."""
     given_as = parameters.get(f"mesh.{mesh}.input") or topic_names.VERTICES
-    if parameters.get(f"mesh.{mesh}.file") or given_as in topic_names.WHOLE:
+    points = mesh in (parameters.get("points") or [])
+    if parameters.get(f"mesh.{mesh}.file") or topic_names.is_whole(given_as, points):
         return []
     topology, *positions = (
         topic_names.of_mesh(mesh, kind) for kind in (topic_names.TOPOLOGY, *topic_names.positions(given_as))

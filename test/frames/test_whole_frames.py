@@ -64,6 +64,17 @@ def test_a_topology_of_its_own_is_rejected():
     assert scene.topology("cloth").version == 9
 
 
+def test_a_cloud_is_all_of_a_mesh_of_points():
+    scene = assembler(MeshSettings("grains", whole=True, points=True))
+    clouds = [MeshFrame(stamp, np.full((n, 3), float(stamp)), sent=stamp) for stamp, n in enumerate((4, 4, 5, 4))]
+    (a,), (b,), (c,), (d,) = (scene.add("grains", cloud).frames for cloud in clouds)
+    assert b.same_scene(a) and not c.same_scene(b) and not d.same_scene(c)
+    topologies = [one.topologies[0] for one in (a, c, d)]
+    assert [t.n_vertices for t in topologies] == [t.version for t in topologies] == [4, 5, 4]
+    assert not any(len(t.faces) + len(t.edges) for t in topologies)
+    assert [origin.topology for one in (a, b, c) for origin in one.origins] == [0, 1, 2]
+
+
 def test_beside_a_static_whole_mesh():
     scene = assembler(MeshSettings("room", static=True, whole=True), WHOLE)
     (rejection,) = scene.add("cloth", frame(1)).rejections

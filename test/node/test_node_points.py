@@ -58,7 +58,6 @@ class Stream:
 
     def __init__(self, node):
         self.node, self.sent = node, 0
-        node.peer.topology("grains", (), GRAINS)
         node.peer.topology("rod", (), 4, edges=ROD)
         node.peer.topology("cloth", FACES, N * N)
         self.send()
@@ -146,8 +145,10 @@ def test_requests_and_triangles(start_node):
     topologies["grains"] = client.topology_message([[0, 1, 2]], GRAINS)
     response = ask(topologies)
     assert not response.success and "take grains out of parameter points" in response.message
-    node.peer.topology("grains", [[0, 1, 2]], GRAINS, version=1)
-    node.frames_status(**{"topologies_rejected.grains.bad_topology": 1})
+    node.peer.topology("rod", [[0, 1, 2]], 4, version=1)
+    node.frames_status(**{"topologies_rejected.rod.bad_topology": 1})
+    node.peer.topology("grains", (), GRAINS)
+    node.frames_status(**{"topologies_rejected.grains.topology_conflict": 1})
 
 
 def test_points_alone_are_drawn(start_node, tmp_path, hpccd):
@@ -156,7 +157,6 @@ def test_points_alone_are_drawn(start_node, tmp_path, hpccd):
     given = {"meshes": ["grains"], "points": ["grains"], "mesh.grains.input": "points", "thickness": ["grains:0.05"]}
     node = start_node(given | {"markers": True, "markers_rate": 1e3, "record": str(path)})
     heard = listen(node, MarkerArray, "markers", qos.MARKERS)
-    node.peer.topology("grains", (), GRAINS)
     for k in range(3):
         message = cloud(positions(k)[0])
         message.header.stamp, message.header.frame_id = ns_to_stamp(k), "world"

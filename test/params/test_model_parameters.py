@@ -56,7 +56,7 @@ def test_markers_show_nearest_points_of_thick_meshes():
 def test_points():
     assert [mesh.points for mesh in builder(points=["ball"]).meshes] == [False, True]
     settings, meshes = checked(points=["ball"], mesh__ball__input="points")
-    assert scene_parameters.mesh_settings(settings, meshes)[1].points
+    assert [mesh.whole for mesh in scene_parameters.mesh_settings(settings, meshes)] == [False, True]
 
 
 def test_meshes():
@@ -94,6 +94,10 @@ def test_meshes():
         ),
         ({"stop_detail": ["cloth:0.1"], "planes": ["floor"]}, "stop_detail: is not offered with planes"),
         ({"stop_detail": ["cloth:0.1"], "points": ["ball"]}, "stop_detail: is not offered with points"),
+        (
+            {"points": ["ball"], "mesh__ball__input": "points", "mesh__ball__file": "ball.stl"},
+            "mesh.ball.file: with mesh.ball.input points each message is the whole mesh; leave one of them out",
+        ),
         ({"points": ["bal"]}, "points: 'bal' must be a mesh out of cloth, ball; did you mean ball?"),
         ({"planes": ["floor"], "points": ["floor"]}, "points: 'floor' must be a mesh out of cloth, ball"),
         (

@@ -49,6 +49,13 @@ def test_what_a_replay_needs_and_is_not_there(given, came, missing):
     assert text.endswith("give the node mesh.box.file")
 
 
+def test_a_cloud_of_a_mesh_of_points_needs_no_topology():
+    parameters = {"meshes": ["box"], "mesh.box.input": "points", "points": ["box"]}
+    came = {"meshes/box/points": 3}
+    assert missing_shapes(parameters, str, came) == []
+    assert len(missing_shapes(parameters | {"points": []}, str, came)) == 1
+
+
 def test_a_recorder_that_came_late_says_it_at_once_and_at_the_end(start_node, children, tmp_path):
     node = start_node({"meshes": ["box"], "mesh.box.input": "pose"})
     node.peer.topology("box", np.array([[0, 1, 2]]), 3)
