@@ -393,3 +393,12 @@ def test_depths_of_a_recording(hpccd, small_bag, tmp_path, options):
     image = imread(tmp_path / "step.png")
     part = image[200:1000, 100 : int(0.8 * image.shape[1]), :3]  # where the meshes are
     assert ((part > 0.97).all(axis=2).sum() > 40) == bool(options)
+
+
+@pytest.mark.parametrize("count", [1, 3, 14])
+def test_the_line_of_facts_fits_the_picture(count):
+    picture = dataclasses.replace(picture_of([[0, 0, 0]], [0.5]), facts=["1,234 vertex-face"] * count)
+    figure = contacts.compose(picture, size=(320, 200))
+    (line,) = (text for text in figure.texts if "vertex-face" in text.get_text())
+    assert line.get_window_extent().x1 < 0.98 * figure.bbox.width
+    assert (line.get_fontsize() == 11.5) == (count < 14)
