@@ -17,7 +17,7 @@ from hpccd_ros.detect.plane_patch import patch
 from hpccd_ros.detect.scene import PlaneSettings, SceneBuilder
 from hpccd_ros.detect.separation import Separation
 from hpccd_ros.detect.step_detector import StepDetector
-from hpccd_ros.frames.types import MeshSettings, Placement, SceneFrame, Topology
+from hpccd_ros.frames.types import NO_FACES, MeshSettings, Placement, SceneFrame, Topology
 
 N = 8
 SHEET = Topology(3, N * N, sheet_faces(N))
@@ -144,3 +144,51 @@ def test_patch_of_a_plane():
 def test_patch_of_a_plane_with_an_extreme_normal(huge):
     corners = patch(PlaneSettings("floor", (0.0, 0.0, huge), 0.0), [np.array([[0.0, 0, 1], [2, 2, 1]])])
     assert np.allclose(corners[:, 2], 0.0)
+
+
+GRAINS = MeshSettings("grains", points=True)
+
+
+def grains_and_cloth(k, n=30):
+    """Grains fall onto the sheet."""
+    grains = np.random.default_rng(2).uniform(0, 0.33, (n, 3)) + (0, 0, 0.2 - 0.25 * k)
+    topologies = Topology(n, n, NO_FACES), SHEET
+    return SceneFrame(k, k, "", topologies, (grains, sheet_positions(N, k).astype(float)), ("grains", "cloth"), 0.0)
+
+
+def test_points_of_a_mesh_are_tested_and_heeded_by_stop():
+    builder = SceneBuilder((GRAINS, CLOTH))
+    options = replace(OPTIONS, thickness=(("grains", 0.02),))
+    start, end = grains_and_cloth(0), grains_and_cloth(1)
+    found = StepDetector(builder, options).detect(start, end)
+    scene = hc.Scene()
+    scene.add_points("grains", 30, thickness=0.02)
+    scene.add_mesh("cloth", SHEET.faces)
+    expected = hc.Detector(scene).detect(*(np.concatenate(frame.vertices) for frame in (start, end)))
+    assert found.contacts == expected and min(len(expected.vv), len(expected.vf)) > 0
+    summaries = {(s.mesh_a, s.mesh_b): s.count for s in summarise(found)}
+    assert summaries["grains", "grains"] == len(expected.vv)
+    least = next(gap.distance for gap in found.gaps if (gap.mesh_a, gap.mesh_b) == ("grains", "cloth"))
+    nearness = Nearness(builder, options, 0.0)
+    assert nearness.within(start, end) == (("grains", "cloth"), 0.0) and least < 0
+    with pytest.raises(ValueError, match=r"faces: 98 triangles in a mesh of points; .*take grains out"):
+        builder.build((SHEET, SHEET))
+
+
+def test_points_that_move_by_poses():
+    """Each point of a body that turns is tested against a resting one."""
+    body = Body.of(np.array([[0.5, 0, 0], [-0.5, 0, 0], [0, 0.5, 0.1]]))
+    topologies = Topology(3, 3, NO_FACES), Topology(1, 1, NO_FACES)
+    settings = (replace(GRAINS, name="body", self_collision=False, input="pose"), replace(GRAINS, name="grain"))
+
+    def at(stamp, angle):
+        place = Placement(body, Rigid.of((0, 0, 0), (0, 0, np.sin(angle / 2), np.cos(angle / 2))))
+        resting = np.array([[0.5 * np.cos(1.0), 0.5 * np.sin(1.0), 0]])
+        return SceneFrame(stamp, stamp, "", topologies, (place.vertices, resting), ("body",), 0.0, (place, None))
+
+    options = replace(OPTIONS, thickness=(("body", 0.01), ("grain", 0.01)), distances=False)
+    found = StepDetector(SceneBuilder(settings), options).detect(at(0, 0.0), at(1, 1.5))
+    # The chord of 0.02 is an angle of 0.04.
+    true = (1.0 - 2 * np.arcsin(0.02)) / 1.5
+    assert found.bounds.parts > 1 and found.contacts.vv.tolist() == [[0, 3]]
+    assert true - 0.01 < found.contacts.first_toc <= true
