@@ -240,8 +240,8 @@ def _write_title(figure, picture):
     figure.text(0.03, 0.945, picture.title, color=INK, fontsize=21, fontweight="bold", va="center")
     figure.text(0.97, 0.945, picture.scene, color=INK, fontsize=14, va="center", ha="right")
     facts = figure.text(0.03, 0.905, "   ·   ".join(picture.facts), color=FAINT, fontsize=11.5, va="center")
-    width = facts.get_window_extent().width / figure.bbox.width
-    facts.set_fontsize(11.5 * min(1.0, 0.94 / width))
+    while facts.get_window_extent().x1 > 0.97 * figure.bbox.width and facts.get_fontsize() > 4:
+        facts.set_fontsize(facts.get_fontsize() - 0.5)  # widths of letters are rounded: no proportion
     names = [name for name, *_ in picture.meshes]
     colours = dict(zip(mesh_groups(names), mesh_colours(names), strict=True))
     if picture.intersecting is not None and picture.intersecting.any():
