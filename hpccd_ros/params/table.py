@@ -68,7 +68,7 @@ SCENE_ROWS = (
         "string[]",
         [],
         "Names of planes, such as a floor. Each bounds a half-space, costs almost nothing, and has parameters "
-        "plane.NAME.*; in parameters of pairs its name stands for a mesh",
+        "plane.NAME.*; parameters of pairs name it like a mesh",
         change=NEVER,
         example=["floor"],
     ),
@@ -174,8 +174,9 @@ DETECTION_ROWS = (
         "thickness",
         "string[]",
         [],
-        "Thickness of meshes, as NAME:THICKNESS; the name of a robot means all its links. The separation of two meshes "
-        "is theirs plus both thicknesses, and distances are between the thick surfaces",
+        "Thickness of meshes on each side of their triangles, half of that of a sheet, as NAME:THICKNESS; the name of "
+        "a robot means all its links. It is added to the separation of each pair, and distances are between the thick "
+        "surfaces",
         change=ALWAYS,
         example=["cloth:0.002"],
     ),
