@@ -397,7 +397,8 @@ class Scene:
             Vertex and face, in scene-wide indices, as rows of ``contacts.vf``.
         ee : ArrayLike, shape (M, 4), integers
             The vertices of two edges, in scene-wide indices, as rows of ``contacts.ee``. The order of the edges, and of
-            the vertices of each, does not matter.
+            the vertices of each, does not matter. A point of :meth:`add_points` is an edge with its vertex twice:
+            ``[v, v, w, w]`` for a row of ``contacts.vv``, ``[v, v, a, b]`` of ``ve``.
         ef : ArrayLike, shape (K, 3), integers
             The vertices of an edge, and a face, in scene-wide indices, as rows of ``intersections.ef``.
 

@@ -465,7 +465,8 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
   py::class_<Detector>(m, "Detector")
       // Copies the scene: later changes of the caller's scene do not affect this detector.
       .def(py::init([](const Scene& scene, const Options& options) {
-             return std::make_unique<Detector>(std::make_shared<const Scene>(scene), options);
+             auto copy = std::make_shared<const Scene>(scene);
+             return unlocked([&] { return std::make_unique<Detector>(std::move(copy), options); });  // filters: seconds
            }),
            "scene"_a, "options"_a)
       .def(

@@ -5,6 +5,7 @@ import copy
 import itertools
 import math
 import pickle
+import threading
 import time
 
 import filtered
@@ -286,6 +287,38 @@ def test_too_many_rings_are_rejected_at_once():
     scene.ignore_within("rope", rings=10**9)
     with pytest.raises(ValueError, match=r"rings: ignores 2\^32 pairs or more; give fewer rings"):
         hc.Detector(scene, threads=1)
+
+
+def test_other_threads_run_while_filters_are_found():
+    vertices, faces = hc.shapes.grid(150, 150)
+    scene = hc.Scene()
+    scene.add_mesh("cloth", faces)
+    scene.ignore_within("cloth", rest_vertices=vertices, distance=0.04)  # takes a second
+    ready, made, turns = threading.Event(), threading.Event(), 0
+
+    def make():
+        ready.wait()
+        hc.Detector(scene, threads=1)
+        made.set()
+
+    thread = threading.Thread(target=make)
+    thread.start()
+    ready.set()
+    while not made.wait(0.01):
+        turns += 1
+    thread.join()
+    assert turns > 5  # 0 or 1 if the interpreter is locked meanwhile
+
+
+def test_points_are_edges_of_one_vertex():
+    scene = hc.Scene()
+    scene.add_points("grains", 3)
+    scene.add_points("rod", 2, edges=[[0, 1]])
+    vertices = np.zeros((5, 3))
+    assert hc.Detector(scene).proximity(vertices, 0.0).vv.tolist() == [[0, 1], [0, 2], [1, 2]]
+    scene.ignore_features(ee=[[2, 2, 0, 0], [4, 3, 1, 1]])
+    near = hc.Detector(scene).proximity(vertices, 0.0)
+    assert near.vv.tolist() == [[0, 1], [1, 2]] and near.ve.tolist() == [[0, 3, 4], [2, 3, 4]]
 
 
 def test_copies_and_pickles():

@@ -27,15 +27,30 @@ void require_room(std::uint64_t n, const char* name) {
 // The number of each row to the position at which it begins.
 void sum_up(std::vector<std::uint32_t>& first) { std::partial_sum(first.begin(), first.end(), first.begin()); }
 
+// By a counting sort: with rest filters most pairs are found several times, 10^8 for a cloth of 125,000 faces.
 Rows rows_of(Pairs pairs, std::size_t n_rows, const char* name) {
   Rows rows;
   if (pairs.empty()) return rows;
-  std::ranges::sort(pairs);
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-  require_room(pairs.size(), name);
+  std::vector<std::size_t> end(n_rows + 1, 0);
+  for (const auto& [row, value] : pairs) ++end[row + 1];
+  std::partial_sum(end.begin(), end.end(), end.begin());
+  rows.values.resize(pairs.size());
+  for (const auto& [row, value] : pairs) rows.values[end[row]++] = value;  // now the end of the row
+  pairs = {};
   rows.first.assign(n_rows + 1, 0);
-  for (const auto& [row, value] : pairs) ++rows.first[row + 1], rows.values.push_back(value);
-  sum_up(rows.first);
+  auto kept = rows.values.begin(), begin = kept;
+  for (std::size_t row = 0; row < n_rows; ++row) {
+    const auto last = rows.values.begin() + static_cast<std::ptrdiff_t>(end[row]);
+    std::sort(begin, last);
+    const auto different = std::unique(begin, last);
+    kept = kept == begin ? different : std::move(begin, different, kept);
+    begin = last;
+    const auto n = static_cast<std::size_t>(kept - rows.values.begin());
+    require_room(n, name);
+    rows.first[row + 1] = static_cast<std::uint32_t>(n);
+  }
+  rows.values.erase(kept, rows.values.end());
+  rows.values.shrink_to_fit();
   return rows;
 }
 
