@@ -131,6 +131,7 @@ class Contacts(PairsOfWorlds, WithSides):
     def normals(self) -> NDArray[np.float64]:
         """(N+M, 3) float64, vertex-face first: unit vectors from the face to the vertex, or from edge a to edge b.
 
+        In rows of `vp` the normal of the plane; in `vv` and `ve` from the first point to the other one, or to the edge.
         The normal is perpendicular to the face, or to both edges, at the time of impact, and points to the side on
         which the vertex or edge b is just before. For contact at t = 0 it is the side from which the straight motion
         would have come had it begun earlier. With a minimum separation it is the direction between the nearest points.
