@@ -3,10 +3,16 @@
 #include "bindings_detail.h"
 
 #include <pybind11/numpy.h>
+#include <pybind11/stl.h>
 
 #include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "base/cancellation.h"
 #include "base/standard_arithmetic.h"
@@ -78,24 +84,33 @@ void bind_detail(py::module_& m) {
             return copied<double>(found);
           },
           "name"_a, "vertices"_a, "first_vertex"_a, "most"_a)
-      // Some rows of positions.
+      // Some rows of positions, and whether all their coordinates look finite and not huge.
       .def(
           "rows",
-          [](DetailThreads& t, const py::array& vertices, const Array<std::uint32_t>& of) -> py::array {
-            const auto take = [&]<class Real>(Real) {
+          [](DetailThreads& t, const py::array& vertices, const Array<std::uint32_t>& of) {
+            std::atomic<bool> good{true};
+            const auto take = [&]<class Real>(Real) -> py::array {
               Array<Real> taken({of.size(), py::ssize_t{3}});
               const Real* from = static_cast<const Real*>(positions(vertices).data);
               Real* to = taken.mutable_data();
               const std::span numbers(of.data(), static_cast<std::size_t>(of.size()));
               t.run([&](ThreadPool& pool) {
                 parallel_for(pool, numbers.size(), 4096, [&](std::size_t begin, std::size_t end, int) {
+                  bool all = true;
                   for (std::size_t i = begin; i < end; ++i)
-                    std::copy_n(from + 3 * std::size_t{numbers[i]}, 3, to + 3 * i);
+                    for (std::size_t k = 0; k < 3; ++k) {
+                      const Real x = to[3 * i + k] = from[3 * std::size_t{numbers[i]} + k];
+                      all &= std::fabs(x) <=
+                             static_cast<Real>(std::min<double>(most_coordinate_unchecked,
+                                                                std::numeric_limits<Real>::max()));  // false for NaN
+                    }
+                  if (!all) good = false;
                 });
               });
               return taken;
             };
-            return positions(vertices).is_double ? py::array(take(double{})) : py::array(take(float{}));
+            const py::array taken = positions(vertices).is_double ? take(double{}) : take(float{});
+            return py::make_tuple(taken, good.load());
           },
           "vertices"_a, "of"_a);
 
@@ -120,30 +135,31 @@ void bind_detail(py::module_& m) {
                              })
       // The corners of pieces and where they are mapped: (coarse face, v, w, s, b1, b2), and on coarse edges
       // (a, b, v, w, s, r).
-      .def_property_readonly("mapped",
-                             [](const CoarseMesh& c) {
-                               std::vector<std::array<double, 6>> in_faces, on_edges;
-                               for (std::size_t face = 0; face < c.patches.faces.size(); ++face) {
-                                 const auto number = static_cast<double>(face);
-                                 for (const MappedVertex& m : c.patches.vertices[face])
-                                   in_faces.push_back({number, double(m.vertex), double(m.vertex), 0, m.b1, m.b2});
-                                 for (const MappedPoint& m : c.patches.points[face])
-                                   in_faces.push_back({number, double(m.v), double(m.w), m.s, m.b1, m.b2});
-                               }
-                               for (std::size_t e = 0; e < c.patches.edges.size(); ++e)
-                                 for (const Crossing& m : c.patches.crossings[e])
-                                   on_edges.push_back({double(c.patches.edges[e][0]), double(c.patches.edges[e][1]),
-                                                       double(m.v), double(m.w), m.s, m.r});
-                               return py::make_tuple(copied<double>(in_faces, 6), copied<double>(on_edges, 6));
-                             })
+      .def_property_readonly(
+          "mapped",
+          [](const CoarseMesh& c) {
+            std::vector<std::array<double, 6>> in_faces, on_edges;
+            for (std::size_t face = 0; face < c.patches.faces.size(); ++face) {
+              const auto number = static_cast<double>(face);
+              for (const MappedVertex& m : c.patches.vertices[face])
+                in_faces.push_back({number, double(m.vertex), double(m.vertex), 0, double{m.b1}, double{m.b2}});
+              for (const MappedPoint& m : c.patches.points[face])
+                in_faces.push_back({number, double(m.v), double(m.w), double{m.s}, double{m.b1}, double{m.b2}});
+            }
+            for (std::size_t e = 0; e < c.patches.edges.size(); ++e)
+              for (const Crossing& m : c.patches.crossings[e])
+                on_edges.push_back({double(c.patches.edges[e][0]), double(c.patches.edges[e][1]), double(m.v),
+                                    double(m.w), double{m.s}, double{m.r}});
+            return py::make_tuple(copied<double>(in_faces, 6), copied<double>(on_edges, 6));
+          })
       .def(
           "deviations",
-          [](const CoarseMesh& c, const py::array& vertices, std::uint32_t first_vertex, double largest, double most,
-             DetailThreads& threads) {
+          [](const CoarseMesh& c, const py::array& vertices, std::uint32_t first_vertex, std::optional<double> largest,
+             double most, DetailThreads& threads) -> std::optional<Array<double>> {
             const Positions given = positions(vertices);
-            const std::vector<double> found = threads.run(
+            const auto found = threads.run(
                 [&](ThreadPool& pool) { return deviations(c.patches, given, first_vertex, largest, most, pool); });
-            return copied<double>(found);
+            return found ? std::optional(copied<double>(*found)) : std::nullopt;
           },
           "vertices"_a, "first_vertex"_a, "largest"_a, "most"_a, "threads"_a)
       // (vf, ee, ef)
@@ -158,6 +174,20 @@ void bind_detail(py::module_& m) {
                                   copied<std::uint32_t>(found.ef, 3));
           },
           "lone_edges"_a, "n_vertices"_a, "threads"_a);
+
+  py::class_<CoarseFeatures>(m, "CoarseFeatures")
+      .def(py::init([](const Array<std::uint32_t>& faces, std::size_t n_vertices) {
+             return std::make_unique<CoarseFeatures>(rows<Face>(faces), n_vertices);
+           }),
+           "faces"_a, "n_vertices"_a)
+      .def(
+          "bounds",
+          [](const CoarseFeatures& c, const Array<std::uint32_t>& vf, const Array<std::uint32_t>& ee,
+             const Array<double>& of_faces) {
+            return copied<double>(c.bounds(rows<std::array<std::uint32_t, 2>>(vf),
+                                           rows<std::array<std::uint32_t, 4>>(ee), rows<double>(of_faces)));
+          },
+          "vf"_a, "ee"_a, "of_faces"_a);
 
   // Its part of Contacts::hash, of edge-face pairs at the start.
   m.def(

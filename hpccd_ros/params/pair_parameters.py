@@ -136,12 +136,12 @@ def separation(settings: dict[str, Any], links: Links = NO_LINKS) -> Separation:
 
 def stop_detail(settings: dict[str, Any], links: Links = NO_LINKS) -> tuple[tuple[str, float], ...]:
     """Parameter ``stop_detail`` as (mesh name, ratio). Raises ParameterError."""
-    for parameter, instead in (("planes", ", or use a mesh as the floor"), ("points", "")):
-        if settings["stop_detail"] and settings[parameter]:
-            raise ParameterError(f"stop_detail: is not offered with {parameter}; leave one of both out{instead}")
     if settings["stop_detail"] and importlib.util.find_spec("fast_simplification") is None:
         raise ParameterError("stop_detail: needs the package fast-simplification; run pip install fast-simplification")
-    return _of_meshes(settings, links, "stop_detail", "RATIO", "a ratio above 0 and below 1", lambda x: 0 < x < 1)
+    found = _of_meshes(settings, links, "stop_detail", "RATIO", "a ratio above 0 and below 1", lambda x: 0 < x < 1)
+    if of_points := [name for name, _ in found if name in settings["points"]]:
+        raise ParameterError(f"stop_detail: {of_points[0]!r} has points and no faces; leave it out")
+    return found
 
 
 def _reject_planes(agreed: Iterable[_PairSetting], settings: dict[str, Any], what: str) -> None:

@@ -92,8 +92,7 @@ def test_meshes():
             {"stop_detail": ["cloth:1.5"]},
             "'cloth:1.5' must be NAME:RATIO with a mesh out of cloth, ball and a ratio above 0",
         ),
-        ({"stop_detail": ["cloth:0.1"], "planes": ["floor"]}, "stop_detail: is not offered with planes"),
-        ({"stop_detail": ["cloth:0.1"], "points": ["ball"]}, "stop_detail: is not offered with points"),
+        ({"stop_detail": ["ball:0.1"], "points": ["ball"]}, "stop_detail: 'ball' has points and no faces"),
         (
             {"points": ["ball"], "mesh__ball__input": "points", "mesh__ball__file": "ball.stl"},
             "mesh.ball.file: with mesh.ball.input points each message is the whole mesh; leave one of them out",

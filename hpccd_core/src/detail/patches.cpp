@@ -7,7 +7,6 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
-#include <optional>
 #include <string>
 #include <utility>
 
@@ -43,12 +42,15 @@ Weights nearest(Vec p, Vec a, Vec b, Vec c) {
   return {vb / (va + vb + vc), vc / (va + vb + vc)};
 }
 
-// Multiples of 2^-24 in [0, 1] with a sum of at most 1. NaN, of a triangle without area, becomes 0.
-Weights on_grid(Weights w) {
-  constexpr double grid = 0x1p24;
-  const auto rounded = [](double x) { return x >= 0 ? std::floor(std::min(x, 1.0) * grid + 0.5) / grid : 0.0; };
-  const double b1 = rounded(w.b1);
-  return {b1, std::min(rounded(w.b2), 1 - b1)};
+// Weights with a sum of at most 1. NaN, of a triangle without area, becomes 0.
+struct OnGrid {
+  Weight b1, b2;
+};
+OnGrid on_grid(Weights w) {
+  constexpr int all = 1 << 15;
+  const auto rounded = [](double x) { return x >= 0 ? static_cast<int>(std::min(x, 1.0) * all + 0.5) : 0; };
+  const int b1 = rounded(w.b1), b2 = std::min(rounded(w.b2), all - b1);
+  return {{static_cast<std::uint16_t>(b1)}, {static_cast<std::uint16_t>(b2)}};
 }
 
 bool is_corner(const Face& f, std::uint32_t v) { return f[0] == v || f[1] == v || f[2] == v; }
@@ -71,7 +73,37 @@ SegmentParameters crossing_of(Vec p, Vec q, Vec a, Vec b) {
   return {s, r};
 }
 
-float on_grid(double x) { return static_cast<float>(on_grid(Weights{x, 0}).b1); }
+Weight on_grid(double x) { return on_grid(Weights{x, 0}).b1; }
+
+// Rows of numbers, ascending and each once, by an index.
+struct Rows {
+  std::vector<std::uint64_t> first;
+  std::vector<std::uint32_t> values;
+  std::span<const std::uint32_t> operator[](std::size_t i) const {
+    return std::span(values).subspan(first[i], first[i + 1] - first[i]);
+  }
+  // fill(i, row) for each row, by all threads.
+  template <class Fill>
+  Rows(std::size_t n, ThreadPool& pool, Fill&& fill) : first(n + 1, 0) {
+    constexpr std::size_t grain = 256;
+    std::vector<std::vector<std::uint32_t>> pieces((n + grain - 1) / grain);
+    parallel_for(pool, n, grain, [&](std::size_t begin, std::size_t end, int) {
+      std::vector<std::uint32_t>& piece = pieces[begin / grain];
+      std::vector<std::uint32_t> row;
+      for (std::size_t i = begin; i < end; ++i) {
+        row.clear();
+        fill(i, row);
+        std::sort(row.begin(), row.end());
+        row.erase(std::unique(row.begin(), row.end()), row.end());
+        piece.insert(piece.end(), row.begin(), row.end());
+        first[i + 1] = row.size();
+      }
+    });
+    for (std::size_t i = 0; i < n; ++i) first[i + 1] += first[i];
+    values.reserve(first[n]);
+    for (const auto& piece : pieces) values.insert(values.end(), piece.begin(), piece.end());
+  }
+};
 
 constexpr std::uint32_t no_face = 0xFFFFFFFFu;
 
@@ -79,7 +111,7 @@ constexpr std::uint32_t no_face = 0xFFFFFFFFu;
 // its point lies.
 struct Corner {
   std::uint32_t v, w;
-  float s = 0, r = 0;
+  Weight s, r;
   Edge edge{};                             // the coarse edge
   std::array<std::uint32_t, 2> of_edge{};  // the coarse faces at it
   std::span<const std::uint32_t> of_vertex{};
@@ -104,11 +136,13 @@ class Mapping {
         survivor_(survivor),
         rest_(rest),
         at_(coarse_, rest.n),
-        nearest_(rest.n, no_face) {
-    parallel_for(pool, rest.n, 1024, [&](std::size_t begin, std::size_t end, int) {
-      for (auto v = static_cast<std::uint32_t>(begin); v < end; ++v) nearest_[v] = nearest_to(v);
-    });
-  }
+        labels_(rest.n, pool,
+                [&](std::size_t v, std::vector<std::uint32_t>& row) { labels_of(static_cast<std::uint32_t>(v), row); }),
+        beside_(coarse.size(), pool, [&](std::size_t c, std::vector<std::uint32_t>& row) {
+          for (const std::uint32_t corner : coarse_[c])
+            for (const std::uint32_t d : at_.faces_of(corner))
+              if (common_edge(static_cast<std::uint32_t>(c), d)) row.push_back(d);
+        }) {}
 
   // False if the face remains as it is.
   bool cut(std::uint32_t number, Pieces& to) const {
@@ -116,10 +150,10 @@ class Mapping {
     bool cut = true;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t v = faces_[number][k], w = faces_[number][(k + 1) % 3];
-      if (nearest_[v] == no_face) return false;
+      if (labels_[v].empty()) return false;
       ring.push_back(corner(v));
       cuts.clear();
-      if (nearest_[w] == no_face) return false;
+      if (labels_[w].empty()) return false;
       if (v != w && !crossings(std::min(v, w), std::max(v, w), cuts)) cut = false;
       if (v > w) std::reverse(cuts.begin(), cuts.end());
       ring.insert(ring.end(), cuts.begin(), cuts.end());
@@ -157,14 +191,14 @@ class Mapping {
     return {x[0], x[1], x[2]};
   }
   Vec at(const Corner& c) const { return at(c.v) + double{c.s} * (at(c.w) - at(c.v)); }
-  Weights weights(Vec p, std::uint32_t face) const {
+  OnGrid weights(Vec p, std::uint32_t face) const {
     const Face& f = coarse_[face];
     return on_grid(nearest(p, at(f[0]), at(f[1]), at(f[2])));
   }
   double square_to(Vec p, std::uint32_t face) const {
-    const Weights w = weights(p, face);
+    const auto [b1, b2] = weights(p, face);
     const Face& f = coarse_[face];
-    const Vec d = p - ((1 - w.b1 - w.b2) * at(f[0]) + w.b1 * at(f[1]) + w.b2 * at(f[2]));
+    const Vec d = p - ((1.0 - b1 - b2) * at(f[0]) + double{b1} * at(f[1]) + double{b2} * at(f[2]));
     return dot(d, d);
   }
   // First of the coarse faces at the survivor, then descending to those that share a vertex with the best so far.
@@ -181,10 +215,22 @@ class Mapping {
     }
     return best.face;
   }
-  Corner corner(std::uint32_t v) const {
-    const auto faces = at_.faces_of(v);
-    return {.v = v, .w = v, .of_vertex = faces.empty() ? std::span(&nearest_[v], 1) : faces};
+  // The coarse faces in which a vertex lies: those at it; or the nearest one, and others about as near: many
+  // vertices of regular nets lie on coarse edges.
+  void labels_of(std::uint32_t v, std::vector<std::uint32_t>& row) const {
+    if (survivor_[v] == no_vertex) return;
+    if (const auto faces = at_.faces_of(v); !faces.empty()) return row.assign(faces.begin(), faces.end());
+    const std::uint32_t nearest = nearest_to(v);
+    if (nearest == no_face) return;
+    row.push_back(nearest);
+    const Face& f = coarse_[nearest];
+    const Vec e = at(f[1]) - at(f[0]), d = at(f[2]) - at(f[0]);
+    const double most = std::sqrt(square_to(at(v), nearest)) + 0.01 * std::sqrt(std::max(dot(e, e), dot(d, d)));
+    for (const std::uint32_t corner : f)
+      for (const std::uint32_t c : at_.faces_of(corner))
+        if (square_to(at(v), c) <= most * most) row.push_back(c);
   }
+  Corner corner(std::uint32_t v) const { return {.v = v, .w = v, .of_vertex = labels_[v]}; }
 
   // The common edge of two coarse faces, if they have exactly two common corners.
   std::optional<Edge> common_edge(std::uint32_t c, std::uint32_t d) const {
@@ -206,33 +252,38 @@ class Mapping {
     const Vec d = at(c) - (at(c.edge[0]) + double{c.r} * (at(c.edge[1]) - at(c.edge[0])));
     return dot(d, d);
   }
-  // From a coarse face at v to one at w: none, one or two coarse edges. False if they are further apart.
+  // The coarse edges from a coarse face at v to one at w: the fewest, and of several such sequences the nearest. False
+  // if that needs too many.
   bool crossings(std::uint32_t v, std::uint32_t w, std::vector<Corner>& to) const {
-    const auto of_v = corner(v).of_vertex, of_w = corner(w).of_vertex;
-    for (const std::uint32_t c : of_v)
-      if (std::ranges::find(of_w, c) != of_w.end()) return true;
-    double least = std::numeric_limits<double>::infinity();
-    const auto offer = [&](double d, std::initializer_list<Corner> cuts) {
-      if (d < least) least = d, to.assign(cuts);
-    };
-    for (const std::uint32_t c : of_v)
-      for (const std::uint32_t d : of_w)
-        if (const auto edge = common_edge(c, d)) {
-          const Corner cut = crossing(v, w, c, d, *edge);
-          offer(square_of(cut), {cut});
-        }
-    if (!to.empty()) return true;
-    for (const std::uint32_t c : of_v)
-      for (const std::uint32_t d : of_w)
-        for (const std::uint32_t corner : coarse_[c])
-          for (const std::uint32_t between : at_.faces_of(corner))
-            if (const auto first = common_edge(c, between))
-              if (const auto second = common_edge(between, d)) {
-                Corner cut = crossing(v, w, c, between, *first), next = crossing(v, w, between, d, *second);
-                next.s = std::max(next.s, cut.s);
-                offer(std::max(square_of(cut), square_of(next)), {cut, next});
-              }
+    constexpr int most = 4;
+    for (const std::uint32_t c : labels_[v])
+      if (std::ranges::find(labels_[w], c) != labels_[w].end()) return true;
+    Sequence best{{}, std::numeric_limits<double>::infinity()}, sequence;
+    for (int n = 1; n <= most && best.cuts.empty(); ++n)
+      for (const std::uint32_t c : labels_[v]) extend(sequence, v, w, c, n, best);
+    to = best.cuts;
     return !to.empty();
+  }
+  struct Sequence {
+    std::vector<Corner> cuts;
+    double farthest = 0;  // the largest square
+  };
+  // Of the sequences with n more edges from this coarse face on, the best.
+  void extend(Sequence& so_far, std::uint32_t v, std::uint32_t w, std::uint32_t c, int n, Sequence& best) const {
+    for (const std::uint32_t d : beside_[c]) {
+      Corner cut = crossing(v, w, c, d, *common_edge(c, d));
+      if (!so_far.cuts.empty()) cut.s = std::max(cut.s, so_far.cuts.back().s);
+      const double before = so_far.farthest, farthest = std::max(before, square_of(cut));
+      if (!(farthest < best.farthest)) continue;
+      so_far.cuts.push_back(cut);
+      so_far.farthest = farthest;
+      if (n > 1)
+        extend(so_far, v, w, d, n - 1, best);
+      else if (std::ranges::find(labels_[w], d) != labels_[w].end())
+        best = so_far;
+      so_far.cuts.pop_back();
+      so_far.farthest = before;
+    }
   }
 
   static std::uint32_t common(const Corner& a, const Corner& b, const Corner& c) {
@@ -243,8 +294,8 @@ class Mapping {
     return no_face;
   }
   MappedVertex mapped(std::uint32_t v, std::uint32_t face) const {
-    const Weights w = weights(at(v), face);
-    return {v, static_cast<float>(w.b1), static_cast<float>(w.b2)};
+    const auto [b1, b2] = weights(at(v), face);
+    return {v, b1, b2};
   }
   void list(const Corner& c, std::uint32_t face, Pieces& to) const {
     if (!c.is_vertex())
@@ -265,8 +316,8 @@ class Mapping {
       if (c.is_vertex()) {
         list(c, best.face, to);
       } else {
-        const Weights w = weights(at(c), best.face);
-        to.points.push_back({best.face, {c.v, c.w, c.s, static_cast<float>(w.b1), static_cast<float>(w.b2)}});
+        const auto [b1, b2] = weights(at(c), best.face);
+        to.points.push_back({best.face, {c.v, c.w, c.s, b1, b2}});
       }
     to.held.push_back({best.face, number});
   }
@@ -275,7 +326,8 @@ class Mapping {
   std::span<const std::uint32_t> survivor_;
   Positions rest_;
   FaceAdjacency at_;
-  std::vector<std::uint32_t> nearest_;  // by vertex: the nearest coarse face
+  Rows labels_;  // by vertex
+  Rows beside_;  // by coarse face, those with a common edge
 };
 
 void check(const char* name, std::span<const Face> faces, std::size_t n_vertices) {
@@ -307,7 +359,8 @@ template <class T, class Key>
 Grouped<T> grouped(std::vector<std::pair<Key, T>>& all, std::size_t n, auto&& number_of) {
   std::sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
-  Grouped<T> groups{std::vector<std::uint64_t>(n + 1, 0), {}};
+  if (all.size() > UINT32_MAX) throw InvalidArgument("faces: too many for detail; divide the mesh");
+  Grouped<T> groups{std::vector<std::uint32_t>(n + 1, 0), {}};
   groups.rows.reserve(all.size());
   for (const auto& [key, row] : all) ++groups.first[number_of(key) + 1], groups.rows.push_back(row);
   for (std::size_t i = 0; i < n; ++i) groups.first[i + 1] += groups.first[i];
@@ -319,7 +372,9 @@ Vec position(const Real* x, std::uint32_t v) {
   return {x[3 * std::size_t{v}], x[3 * std::size_t{v} + 1], x[3 * std::size_t{v} + 2]};
 }
 
-// The largest |p - q| of some points p, and points q to which they are mapped.
+double largest_of(Vec v) { return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}); }
+
+// A bound on |p - q| for points p and the points q to which they are mapped, from the largest computed square.
 //
 // With u = 2^-53 and all coordinates at most M in magnitude: a point of an edge is computed as v + s (w - v), with
 // errors of 2 u M of the difference, 2 u M of the product and u M of the sum: 5 u M for each coordinate. A point of a
@@ -328,80 +383,55 @@ Vec position(const Real* x, std::uint32_t v) {
 // with terms of second order, so sqrt(3) 15 u M < 26 u M for the length. The squares, their sum and the root have a
 // relative error below 4 u, and underflow hides at most sqrt(3 2^-1074) < 2^-536. Squares that overflow are replaced by
 // the bound |p - q| <= sqrt(3) 2 M.
-class Deviation {
- public:
+double bound_of(double square, double largest) {
+  constexpr double u = 0x1p-53;
+  return std::isinf(square) ? 4 * largest : std::sqrt(square) * (1 + 8 * u) + 26 * u * largest + 0x1p-536;
+}
+
+// Squares of distances. Their sum shows what the largest hides: it is NaN or huge if one is.
+struct Squares {
+  double most = 0, sum = 0;
   void add(Vec p, Vec q) {
     const Vec d = p - q;
-    most_ = std::max(most_, dot(d, d));
+    const double square = dot(d, d);
+    most = std::max(most, square);
+    sum += square;
   }
-  // largest: M
-  double bound(double largest) const {
-    constexpr double u = 0x1p-53;
-    return std::isinf(most_) ? 4 * largest : std::sqrt(most_) * (1 + 8 * u) + 26 * u * largest + 0x1p-536;
-  }
-
- private:
-  double most_ = 0;
+  void include(const Squares& s) { most = std::max(most, s.most), sum += s.sum; }
 };
 
+// Both return the largest square of their own, and include all squares in the sum.
 template <class Real>
-double deviation_of_edge(Edge edge, std::span<const Crossing> crossings, const Real* x, double largest) {
-  Deviation found;
+double square_of_edge(Edge edge, std::span<const Crossing> crossings, const Real* x, Squares& all) {
+  Squares found;
   const Vec a = position(x, edge[0]), ab = position(x, edge[1]) - a;
   for (const Crossing& c : crossings) {
     const Vec v = position(x, c.v), w = position(x, c.w);
     found.add(v + double{c.s} * (w - v), a + double{c.r} * ab);
   }
-  return found.bound(largest);
+  all.include(found);
+  return found.most;
 }
 
+struct SquaresOfFace {
+  double of_all, of_vertices;
+};
 template <class Real>
-double deviation_of_face(const Face& face, std::span<const MappedVertex> vertices, std::span<const MappedPoint> points,
-                         const Real* x, double largest) {
-  if (vertices.empty() && points.empty()) return 0;
-  Deviation found;
-  const Vec x0 = position(x, face[0]), x1 = position(x, face[1]), x2 = position(x, face[2]);
-  const Vec e1 = x1 - x0, e2 = x2 - x0;
+SquaresOfFace squares_of_face(Vec x0, Vec e1, Vec e2, std::span<const MappedVertex> vertices,
+                              std::span<const MappedPoint> points, const Real* x, Squares& all) {
+  Squares found;
   for (const MappedVertex& m : vertices) {
     const Vec v = position(x, m.vertex);
     found.add(v, x0 + (double{m.b1} * e1 + double{m.b2} * e2));
   }
+  const double of_vertices = found.most;
   for (const MappedPoint& m : points) {
     const Vec v = position(x, m.v), w = position(x, m.w);
     found.add(v + double{m.s} * (w - v), x0 + (double{m.b1} * e1 + double{m.b2} * e2));
   }
-  return found.bound(largest);
+  all.include(found);
+  return {found.most, of_vertices};
 }
-
-// Rows of numbers, ascending and each once, by an index.
-struct Rows {
-  std::vector<std::uint64_t> first;
-  std::vector<std::uint32_t> values;
-  std::span<const std::uint32_t> operator[](std::size_t i) const {
-    return std::span(values).subspan(first[i], first[i + 1] - first[i]);
-  }
-  // fill(i, row) for each row, by all threads.
-  template <class Fill>
-  Rows(std::size_t n, ThreadPool& pool, Fill&& fill) : first(n + 1, 0) {
-    constexpr std::size_t grain = 256;
-    std::vector<std::vector<std::uint32_t>> pieces((n + grain - 1) / grain);
-    parallel_for(pool, n, grain, [&](std::size_t begin, std::size_t end, int) {
-      std::vector<std::uint32_t>& piece = pieces[begin / grain];
-      std::vector<std::uint32_t> row;
-      for (std::size_t i = begin; i < end; ++i) {
-        row.clear();
-        fill(i, row);
-        std::sort(row.begin(), row.end());
-        row.erase(std::unique(row.begin(), row.end()), row.end());
-        piece.insert(piece.end(), row.begin(), row.end());
-        first[i + 1] = row.size();
-      }
-    });
-    for (std::size_t i = 0; i < n; ++i) first[i + 1] += first[i];
-    values.reserve(first[n]);
-    for (const auto& piece : pieces) values.insert(values.end(), piece.begin(), piece.end());
-  }
-};
 
 // The transpose: by value below n, the rows that contain it.
 Rows transposed(const Rows& rows, std::size_t n, ThreadPool& pool) {
@@ -466,21 +496,33 @@ Patches patches_of(std::span<const Face> faces, std::span<const Face> proposed, 
   p.held = grouped(all.held, n, of_face);
   p.vertices = grouped(all.vertices, n, of_face);
   p.points = grouped(all.points, n, of_face);
-  for (const auto& [edge, crossing] : all.crossings) p.edges.push_back(edge);
-  std::sort(p.edges.begin(), p.edges.end());
-  p.edges.erase(std::unique(p.edges.begin(), p.edges.end()), p.edges.end());
-  const auto of_edge = [&](const Edge& edge) {
-    return static_cast<std::uint32_t>(std::ranges::lower_bound(p.edges, edge) - p.edges.begin());
-  };
-  p.crossings = grouped(all.crossings, p.edges.size(), of_edge);
+  std::vector<Edge> edges;
+  for (const auto& [edge, crossing] : all.crossings) edges.push_back(edge);
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  constexpr std::uint32_t none = UINT32_MAX;
+  std::vector<std::uint32_t> number_of_edge(edges.size(), none);
   std::vector<std::pair<std::uint32_t, std::uint32_t>> crossed;
-  for (std::uint32_t c = 0; c < n; ++c)
+  for (std::uint32_t c = 0; c < n; ++c) {
+    p.first_edge.push_back(static_cast<std::uint32_t>(p.edges.size()));
     for (std::size_t k = 0; k < 3; ++k) {
       const auto [a, b] = std::minmax(p.faces[c][k], p.faces[c][(k + 1) % 3]);
-      if (const std::uint32_t e = of_edge({a, b}); e < p.edges.size() && p.edges[e] == Edge{a, b})
-        crossed.push_back({c, e});
+      const Edge edge{a, b};
+      const auto found = std::ranges::lower_bound(edges, edge);
+      if (found == edges.end() || *found != edge) continue;
+      std::uint32_t& e = number_of_edge[static_cast<std::size_t>(found - edges.begin())];
+      if (e == none) e = static_cast<std::uint32_t>(p.edges.size()), p.edges.push_back(edge);
+      crossed.push_back({c, e});
     }
-  p.crossed = grouped(crossed, n, [](std::uint32_t c) { return c; });
+  }
+  p.first_edge.push_back(static_cast<std::uint32_t>(p.edges.size()));
+  const auto as_it_is = [](std::uint32_t i) { return i; };
+  p.crossed = grouped(crossed, n, as_it_is);
+  std::vector<std::pair<std::uint32_t, Crossing>> crossings;
+  for (const auto& [edge, crossing] : all.crossings)
+    crossings.push_back(
+        {number_of_edge[static_cast<std::size_t>(std::ranges::lower_bound(edges, edge) - edges.begin())], crossing});
+  p.crossings = grouped(crossings, p.edges.size(), as_it_is);
   return p;
 }
 
@@ -513,30 +555,90 @@ std::vector<double> largest_coordinates(const char* name, Positions vertices,
   return of_meshes;
 }
 
-std::vector<double> deviations(const Patches& p, Positions vertices, std::uint32_t first_vertex, double largest,
-                               double most, ThreadPool& pool) {
+std::optional<std::vector<double>> deviations(const Patches& p, Positions vertices, std::uint32_t first_vertex,
+                                              std::optional<double> largest, double most, ThreadPool& pool) {
   std::vector<double> of(p.faces.size(), 0), of_edges(p.edges.size(), 0);
-  std::atomic<bool> exceeded{false};
+  std::atomic<bool> exceeded{false}, huge{false};
+  struct alignas(64) OfThread {
+    double corner = 0, square = 0;  // the largest coordinate of a corner, and square of a vertex
+  };
+  std::vector<OfThread> of_threads(static_cast<std::size_t>(pool.size()));
   const auto measure = [&]<class Real>(const Real* all) {
     const Real* x = all + 3 * std::size_t{first_vertex};
-    parallel_for(pool, of_edges.size(), 256, [&](std::size_t begin, std::size_t end, int) {
+    parallel_for(pool, of.size(), 256, [&](std::size_t begin, std::size_t end, int thread) {
       if (exceeded.load(std::memory_order_relaxed)) return;
-      for (std::size_t e = begin; e < end; ++e) {
-        of_edges[e] = deviation_of_edge(p.edges[e], p.crossings[e], x, largest);
-        if (of_edges[e] > most) exceeded.store(true, std::memory_order_relaxed);
-      }
-    });
-    parallel_for(pool, of.size(), 256, [&](std::size_t begin, std::size_t end, int) {
+      OfThread& here = of_threads[static_cast<std::size_t>(thread)];
+      Squares all;
+      double corner = here.corner, square = here.square;
       for (std::size_t c = begin; c < end; ++c) {
-        for (const std::uint32_t e : p.crossed[c]) of[c] = std::max(of[c], of_edges[e]);
-        if (exceeded.load(std::memory_order_relaxed)) continue;
-        of[c] = std::max(of[c], deviation_of_face(p.faces[c], p.vertices[c], p.points[c], x, largest));
-        if (of[c] > most) exceeded.store(true, std::memory_order_relaxed);
+        const auto [i, j, k] = p.faces[c];
+        const Vec x0 = position(x, i), x1 = position(x, j), x2 = position(x, k);
+        const double size = std::max({largest_of(x0), largest_of(x1), largest_of(x2)});
+        corner = std::max(corner, size), all.sum += size;
+        for (std::size_t e = p.first_edge[c]; e < p.first_edge[c + 1]; ++e)
+          of_edges[e] = square_of_edge(p.edges[e], p.crossings[e], x, all);
+        const SquaresOfFace found = squares_of_face(x0, x1 - x0, x2 - x0, p.vertices[c], p.points[c], x, all);
+        of[c] = found.of_all, square = std::max(square, found.of_vertices);
       }
+      here.corner = corner, here.square = square;
+      if (!(all.sum <= most_unchecked)) huge.store(true, std::memory_order_relaxed);
+      if (std::sqrt(all.most) > most) exceeded.store(true, std::memory_order_relaxed);
     });
   };
   vertices.is_double ? measure(static_cast<const double*>(vertices.data))
                      : measure(static_cast<const float*>(vertices.data));
+  if (!largest) {
+    // Each vertex is a corner of a coarse face, or mapped to one: its coordinates are at most those of the corners,
+    // plus its own distance.
+    double corner = 0, square = 0;
+    for (const OfThread& t : of_threads) corner = std::max(corner, t.corner), square = std::max(square, t.square);
+    if (huge || !(corner <= most_coordinate_unchecked)) return std::nullopt;
+    largest = (corner + std::sqrt(square) + 0x1p-536) * (1 + 64 * 0x1p-53);
+  }
+  for (std::size_t c = 0; c < of.size(); ++c)
+    for (const std::uint32_t e : p.crossed[c]) of[c] = std::max(of[c], of_edges[e]);
+  for (std::size_t c = 0; c < of.size(); ++c)
+    if (!p.vertices[c].empty() || !p.points[c].empty() || !p.crossed[c].empty()) of[c] = bound_of(of[c], *largest);
+  return of;
+}
+
+CoarseFeatures::CoarseFeatures(std::span<const Face> faces, std::size_t n_vertices)
+    : faces_(faces.begin(), faces.end()), first_(n_vertices + 1, 0) {
+  std::vector<Edge> edges;
+  for (const Face& f : faces)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto [a, b] = std::minmax(f[k], f[(k + 1) % 3]);
+      edges.push_back({a, b});
+    }
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  for (const auto& [a, b] : edges) ++first_[a + 1], upper_.push_back(b);
+  for (std::size_t v = 0; v < n_vertices; ++v) first_[v + 1] += first_[v];
+  for (const Face& f : faces) edges_of_face_.push_back({edge(f[0], f[1]), edge(f[1], f[2]), edge(f[2], f[0])});
+}
+
+// The number of all edges if it is in no face.
+std::uint32_t CoarseFeatures::edge(std::uint32_t a, std::uint32_t b) const {
+  const std::uint32_t low = std::min(a, b), high = std::max(a, b);
+  for (std::uint32_t e = first_[low]; e < first_[low + 1]; ++e)
+    if (upper_[e] == high) return e;
+  return static_cast<std::uint32_t>(upper_.size());
+}
+
+std::vector<double> CoarseFeatures::bounds(std::span<const std::array<std::uint32_t, 2>> vf,
+                                           std::span<const std::array<std::uint32_t, 4>> ee,
+                                           std::span<const double> of_faces) const {
+  std::vector<double> of, of_vertices(vf.empty() ? 0 : first_.size(), 0),
+      of_edges(ee.empty() ? 0 : upper_.size() + 1, 0);
+  const auto raise = [](double& to, double by) { to = std::max(to, by); };
+  for (std::size_t c = 0; !vf.empty() && c < faces_.size(); ++c)
+    for (const std::uint32_t v : faces_[c]) raise(of_vertices[v], of_faces[c]);
+  for (std::size_t c = 0; !ee.empty() && c < faces_.size(); ++c)
+    for (const std::uint32_t e : edges_of_face_[c]) raise(of_edges[e], of_faces[c]);
+  const auto add = [&](double sum) { of.push_back(sum > 0 ? std::nextafter(sum, INFINITY) : 0); };
+  of.reserve(vf.size() + ee.size());
+  for (const auto& [v, face] : vf) add(of_vertices[v] + of_faces[face]);
+  for (const auto& [a, b, c, d] : ee) add(of_edges[edge(a, b)] + of_edges[edge(c, d)]);
   return of;
 }
 

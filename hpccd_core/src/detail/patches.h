@@ -5,6 +5,7 @@
 #include <array>
 #include <compare>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -17,32 +18,37 @@ using Face = std::array<std::uint32_t, 3>;
 using Edge = std::array<std::uint32_t, 2>;
 inline constexpr std::uint32_t no_vertex = 0xFFFFFFFFu;
 
-// Weights are multiples of 2^-24 in [0, 1]; those of one point have a sum of at most 1: floats hold them, and double
-// precision holds 1 - s and 1 - b1 - b2, exactly.
+// A multiple of 2^-15 in [0, 1]. Those of one point have a sum of at most 1. Double precision holds 1 - s and
+// 1 - b1 - b2 exactly. The pass over all corners waits for memory: they are short.
+struct Weight {
+  std::uint16_t parts = 0;
+  operator double() const { return parts * 0x1p-15; }
+  auto operator<=>(const Weight&) const = default;
+};
 
 // A vertex, and its point (1 - b1 - b2) X0 + b1 X1 + b2 X2 on a coarse face.
 struct MappedVertex {
   std::uint32_t vertex;
-  float b1, b2;
+  Weight b1, b2;
   auto operator<=>(const MappedVertex&) const = default;
 };
 // The point (1 - s) v + s w of an edge, and its point on a coarse face.
 struct MappedPoint {
   std::uint32_t v, w;
-  float s, b1, b2;
+  Weight s, b1, b2;
   auto operator<=>(const MappedPoint&) const = default;
 };
 // The point (1 - s) v + s w of an edge, and its point (1 - r) a + r b on a coarse edge.
 struct Crossing {
   std::uint32_t v, w;
-  float s, r;
+  Weight s, r;
   auto operator<=>(const Crossing&) const = default;
 };
 
 // Rows by number: rows[first[i] .. first[i + 1]).
 template <class T>
 struct Grouped {
-  std::vector<std::uint64_t> first;
+  std::vector<std::uint32_t> first;
   std::vector<T> rows;
   std::span<const T> operator[](std::size_t i) const {
     return std::span(rows).subspan(first[i], first[i + 1] - first[i]);
@@ -57,7 +63,10 @@ struct Patches {
   Grouped<std::uint32_t> held;     // by coarse face: the faces that have a piece in it
   Grouped<MappedVertex> vertices;  // by coarse face
   Grouped<MappedPoint> points;     // by coarse face
-  std::vector<Edge> edges;         // coarse edges that are crossed
+  // Coarse edges that are crossed. Edges first_edge[c] to first_edge[c + 1] are at coarse face c and none before it: a
+  // pass over the faces that measures these too reads each position once.
+  std::vector<Edge> edges;
+  std::vector<std::uint32_t> first_edge;
   Grouped<Crossing> crossings;     // by crossed edge
   Grouped<std::uint32_t> crossed;  // by coarse face: its crossed edges
 };
@@ -74,14 +83,34 @@ Patches patches_of(std::span<const Face> faces, std::span<const Face> proposed, 
 std::vector<double> largest_coordinates(const char* name, Positions vertices,
                                         std::span<const std::int64_t> first_vertex, double most, ThreadPool& pool);
 
+// Coordinates and squares of distances beyond this look wrong, and are checked (largest_coordinates).
+inline constexpr double most_unchecked = 1e150, most_coordinate_unchecked = 1e75;
+
 // For each coarse face, the largest distance of a corner of a piece to the point to which it is mapped, rounded up: no
 // point of the patch is farther from its own point on the coarse face, since the distance is a convex function of the
 // place in the piece (and of time, if vertices move on straight lines: the larger one of both ends bounds it in
-// between). Zero, without rounding, where the patch is the coarse face itself. vertices: of all meshes, all finite;
-// first_vertex: that of this mesh; largest: the largest magnitude of its coordinates. Stops early if a distance is
-// above `most`: then at least one value is, and the others are not complete.
-std::vector<double> deviations(const Patches& patches, Positions vertices, std::uint32_t first_vertex, double largest,
-                               double most, ThreadPool& pool);
+// between). Zero, without rounding, where the patch is the coarse face itself. vertices: of all meshes; first_vertex:
+// that of this mesh; largest: the largest magnitude of its coordinates, if they have been checked. Otherwise nothing is
+// returned if a coordinate may be NaN, infinite or huge. Stops early if a distance is above `most`: then at least one
+// value is, and the others are not complete.
+std::optional<std::vector<double>> deviations(const Patches& patches, Positions vertices, std::uint32_t first_vertex,
+                                              std::optional<double> largest, double most, ThreadPool& pool);
+
+// The features of coarse faces, for their deviations: an edge or a vertex has the greatest of its faces, and 0 without
+// faces.
+class CoarseFeatures {
+ public:
+  CoarseFeatures(std::span<const Face> faces, std::size_t n_vertices);
+  // For each pair the sum of both sides, rounded up. vf, then ee: as in Contacts.
+  std::vector<double> bounds(std::span<const std::array<std::uint32_t, 2>> vf,
+                             std::span<const std::array<std::uint32_t, 4>> ee, std::span<const double> of_faces) const;
+
+ private:
+  std::uint32_t edge(std::uint32_t a, std::uint32_t b) const;
+
+  std::vector<Face> faces_, edges_of_face_;
+  std::vector<std::uint32_t> first_, upper_;  // edges by their lower vertex: first_[v] to first_[v + 1]; upper vertices
+};
 
 // Pairs of features of the coarse mesh that belong to neighbours only, and share no vertex. Two coarse faces are
 // neighbours if they share a vertex, or if faces of their patches do. Lone edges count as patches of their own.
