@@ -85,10 +85,13 @@ struct MotionBounds {
   double margin_of_mesh(std::size_t mesh) const { return margins_[mesh]; }
   // The largest amount by which its boxes have grown.
   double growth_of_mesh(std::size_t mesh) const { return margins_[mesh] + (thickest_.empty() ? 0 : thickest_[mesh]); }
-  // The same of its k-DOPs. Along a diagonal the scene is up to twice as long as along an axis, so the growth of boxes,
-  // which ends where they contain the scene, would not suffice.
-  double kdop_growth_of_mesh(std::size_t mesh) const {
-    return thicker_than_scene_ ? margins_[mesh] + 2 * thickest_[mesh] : growth_of_mesh(mesh);
+  // The largest amount for k-DOPs of some of its vertices. Along a diagonal the scene is up to twice as long as along
+  // an axis, so the growth of boxes, which ends where they contain the scene, would not suffice.
+  double kdop_growth(std::size_t mesh, std::span<const std::uint32_t> of_vertices) const {
+    if (!thickness_ || !(thickest_[mesh] > 0)) return margins_[mesh];
+    double most = 0;
+    for (const std::uint32_t v : of_vertices) most = std::max(most, thickness_[v]);
+    return margins_[mesh] + (thicker_than_scene_ ? 2 : 1) * thickness_in_box(most);
   }
   // Whether boxes have grown by less than their thickness, because it exceeds the scene.
   bool thicker_than_scene() const { return thicker_than_scene_; }

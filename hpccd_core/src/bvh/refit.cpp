@@ -85,8 +85,8 @@ MotionBox leaf_bounds(const Tree& tree, const LeafRange& leaf, const std::vector
 
 // Grows k-DOPs by half a separation on each side, like boxes: leaves with separated k-DOPs then contain no two features
 // that come within the separation of each other. The k-DOPs of features are compared with the same margin (KdopMargin).
-KdopMargin margin_of(const MotionBounds& motion, std::uint32_t mesh) {
-  return {motion.kdop_growth_of_mesh(mesh) + motion.rounding, motion.map.scale};
+KdopMargin margin_of(const MotionBounds& motion, std::uint32_t mesh, std::span<const std::uint32_t> vertices) {
+  return {motion.kdop_growth(mesh, vertices) + motion.rounding, motion.map.scale};
 }
 
 void grow(Kdop& kdop, const KdopMargin& by) {
@@ -122,7 +122,10 @@ void fit_leaf(Tree& tree, std::uint32_t number, const MotionBounds& motion) {
   node.box = leaf_bounds(tree, leaf, motion.boxes);
   if (tree.by_kdops) join_kdops(tree, leaf, motion.kdops);
   if (tree.by_kdops && motion.of_any_part) contain_start(tree.kdops[number]);
-  if (tree.by_kdops && motion.grown) grow(tree.kdops[number], margin_of(motion, node.mesh));
+  if (tree.by_kdops && motion.grown)
+    grow(tree.kdops[number],
+         margin_of(motion, node.mesh,
+                   std::span(tree.corners).subspan(leaf.first_corner, leaf.end_corner - leaf.first_corner)));
   Block& block = tree.blocks[tree.block_of_leaf[number]];
   float bounds[n_bounds];
   std::memcpy(bounds, &node.box, sizeof bounds);

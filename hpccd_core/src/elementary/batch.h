@@ -20,8 +20,11 @@ struct Geometry {
   const VertexKdop* kdops = nullptr;       // of each vertex; null if pairs count that do not touch
   const RoundedMotion* rounded = nullptr;  // for single precision; null if floats are too coarse for the scene
   Separations separations = {};            // for tests of distances
-  KdopMargin margin = {};                  // the largest separation
-  float until = 2;                         // below 1: pairs that cannot touch up to this time may be skipped
+  KdopMargin margin = {};                  // of the largest separation
+  KdopMargin margin_of_none = {};          // of a separation of 0
+  KdopMargin margin_of_one = {};           // of a separation of 1 / kdop_scale, above that of 0
+  double kdop_scale = 0;
+  float until = 2;  // below 1: pairs that cannot touch up to this time may be skipped
 };
 
 template <Kind kind>

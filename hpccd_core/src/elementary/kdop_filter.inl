@@ -18,13 +18,27 @@ HPCCD_HD bool are_apart(const KdopLanes& a, const KdopLanes& b) {
   return any_in_both_halves(less(a.high, b.low), less(b.high, a.low));
 }
 
+// A pair by its position in the batch, with its vertices.
+struct PairAt {
+  std::uint32_t at;
+  const std::uint32_t* v;
+};
+
+// One margin in each direction for all pairs.
+struct OneMargin {
+  Floats16 margin;
+  HPCCD_HD Floats16 operator()(const PairAt&) const { return margin; }
+};
+
 // Whether two features are separated, exactly or by more than a margin in each direction.
 struct Apart {
-  HPCCD_HD bool operator()(const KdopLanes& a, const KdopLanes& b) const { return are_apart(a, b); }
+  HPCCD_HD bool operator()(const KdopLanes& a, const KdopLanes& b, const PairAt&) const { return are_apart(a, b); }
 };
+template <class Margin>
 struct ApartByMore {
-  Floats16 margin;
-  HPCCD_HD bool operator()(const KdopLanes& a, const KdopLanes& b) const {
+  Margin margin_of;
+  HPCCD_HD bool operator()(const KdopLanes& a, const KdopLanes& b, const PairAt& pair) const {
+    const Floats16 margin = margin_of(pair);
     return any_in_both_halves(less(a.high + margin, b.low), less(b.high + margin, a.low));
   }
 };
@@ -32,7 +46,7 @@ struct ApartByMore {
 // Separated by more than a margin in each direction up to a time below 1.
 struct ApartUntil {
   Floats16 margin, time;
-  HPCCD_HD bool operator()(const KdopLanes& a, const KdopLanes& b) const {
+  HPCCD_HD bool operator()(const KdopLanes& a, const KdopLanes& b, const PairAt&) const {
     return any_in_both_halves(less(at(a.high) + margin, at(b.low)), less(at(b.high) + margin, at(a.low)));
   }
   HPCCD_HD Floats16 at(Floats16 x) const {
@@ -57,9 +71,9 @@ HPCCD_HD void list_near(const AreApart& apart, const Geometry& g, const Row* nex
     // fetched too.
     for (int k = 0; k < 4; ++k) __builtin_prefetch(next + v[k]);
     if constexpr (kind == Kind::vertex_face)
-      count += !apart(at(0), both(at(1), both(at(2), at(3))));
+      count += !apart(at(0), both(at(1), both(at(2), at(3))), {i, v});
     else
-      count += !apart(both(at(0), at(1)), both(at(2), at(3)));
+      count += !apart(both(at(0), at(1)), both(at(2), at(3)), {i, v});
   }
   near.n = count;
   near.find_vertices<kind>(g, first, second);

@@ -24,11 +24,24 @@ HPCCD_HD double separation_at(const Geometry& g, std::uint32_t at, Kind kind, st
   return g.separations.between(v[0], v[2]) + g.separations.thickness_of(kind, first, second);
 }
 
+HPCCD_HD bool differ(const Separations& s) { return s.of_candidates || s.of_meshes || s.thick(); }
+
+// A margin for each pair: with that of the largest separation, few pairs would be rejected where a few faces are much
+// thicker than most. Rounding to floats, here of three values and a sum, is within the 1e-6 that KdopMargin adds.
+template <Kind kind>
+struct OwnMargin {
+  const Geometry& g;
+  const std::uint32_t *first, *second;
+  HPCCD_HD Floats16 operator()(const PairAt& pair) const {
+    const double d = separation_at(g, pair.at, kind, first[pair.at], second[pair.at], pair.v);
+    return load16(g.margin_of_none.in) + load16(g.margin_of_one.in) * all16(static_cast<float>(d * g.kdop_scale));
+  }
+};
+
 // Lanes filled by of_lane(lane), for separations that differ between pairs.
 template <class OfLane>
 HPCCD_HD Double separations(const Geometry& g, OfLane&& of_lane) {
-  if (!g.separations.of_candidates && !g.separations.of_meshes && !g.separations.thick())
-    return Double(g.separations.uniform);
+  if (!differ(g.separations)) return Double(g.separations.uniform);
   alignas(64) double d[double_width];
   for (int lane = 0; lane < double_width; ++lane) d[lane] = of_lane(lane);
   Double r;
@@ -41,7 +54,10 @@ void test_separation(const Geometry& g, const std::uint32_t* first, const std::u
                      BatchResult& result) {
   result.n_contacts = result.n_undecided = 0;
   PairList list;
-  list_pairs<kind>(ApartByMore{load16(g.margin.in)}, g, g.vertices, first, second, n, list);
+  if (differ(g.separations))
+    list_pairs<kind>(ApartByMore<OwnMargin<kind>>{{g, first, second}}, g, g.vertices, first, second, n, list);
+  else
+    list_pairs<kind>(ApartByMore<OneMargin>{{load16(g.margin.in)}}, g, g.vertices, first, second, n, list);
   const auto separations_of = [&](const auto& of) {
     return separations(g, [&](int lane) {
       const std::uint32_t at = list.at[of[lane]];
@@ -50,23 +66,33 @@ void test_separation(const Geometry& g, const std::uint32_t* first, const std::u
   };
 
   std::uint64_t none = 0;
+  std::uint32_t n_near = 0;
+  const auto within_at_start = [&](unsigned lanes, const auto& of) {
+    for (; lanes; lanes &= lanes - 1) {
+      result.contact[result.n_contacts] = list.at[of[__builtin_ctz(lanes)]];
+      result.toc[result.n_contacts] = result.delta[result.n_contacts] = 0;
+      ++result.n_contacts;
+    }
+  };
   All all{list.n};
   Chosen beside;
   SearchLanes<kind, decltype(separations_of)> searches(g, list, separations_of, result);
   using Lanes = const Motion<Double>&;
   for_lanes<kind, Double>(g, list, all, [&](Lanes m, const LaneNumbers<All>& of) {
-    append(beside, of, of.valid & ~bits(planes_stay_apart(m, separations_of(of))));
+    const Double d = separations_of(of);
+    unsigned near = 0;
+    if (g.separations.thick() && any(Double(9.0) * (d * d) > dot(m.a0, m.a0)))
+      near = bits(corners_within<kind>(m, d)) & of.valid;
+    within_at_start(near, of);
+    n_near += static_cast<unsigned>(__builtin_popcount(near));
+    if (near != of.valid) append(beside, of, of.valid & ~near & ~bits(planes_stay_apart(m, d)));
   });
   for_lanes<kind, Double>(g, list, beside, [&](Lanes m, const LaneNumbers<Chosen>& of) {
     const Double d = separations_of(of), s = extent(magnitudes(m));
     const Look<kind, Double> start = look<kind>(m, s, Double(0.0));
     const Outcome<Double> o = decided_by_ends(m, d, start, look<kind>(m, s, Double(1.0)));
     const unsigned within = bits(o.contact) & of.valid, apart = bits(o.none) & of.valid;
-    for (unsigned lanes = within; lanes; lanes &= lanes - 1) {
-      result.contact[result.n_contacts] = list.at[of[__builtin_ctz(lanes)]];
-      result.toc[result.n_contacts] = result.delta[result.n_contacts] = 0;
-      ++result.n_contacts;
-    }
+    within_at_start(within, of);
     none += static_cast<unsigned>(__builtin_popcount(apart));
     searches.begin(m, d, start, LaneNumbers<Chosen>{of.numbers, of.begin, of.valid & ~within & ~apart});
   });
@@ -74,7 +100,7 @@ void test_separation(const Geometry& g, const std::uint32_t* first, const std::u
 
   result.counts.tested += n;
   result.counts.kdop += n - list.n;
-  result.counts.coplanarity += list.n - beside.n;
+  result.counts.coplanarity += list.n - n_near - beside.n;
   result.counts.separated += none;
   result.counts.contacts += result.n_contacts;
   result.counts.undecided += result.n_undecided;

@@ -78,6 +78,21 @@ HPCCD_HD typename RealTraits<R>::Mask planes_stay_apart(const Motion<R>& m, R d)
   return in_range(size) && certainly_no_root(coplanarity(m), coplanarity_error(size).coefficient + slack);
 }
 
+// Whether two corners are certainly within d at the start. Where thicknesses are as large as features, as on coarse
+// meshes with a bound, most contacts are found here, at a fifth of the cost of the nearest points.
+template <Kind kind, class R>
+HPCCD_HD typename RealTraits<R>::Mask corners_within(const Motion<R>& m, R d) {
+  const R s = extent(magnitudes(m));
+  const auto square = [](const Vec3<R>& v) { return dot(v, v); };
+  const Vec3<R> other = m.p0 - m.a0;
+  R least = lesser(square(m.p0), square(other));
+  if constexpr (kind == Kind::vertex_face)
+    least = lesser(least, square(m.p0 - m.b0));
+  else
+    least = lesser(least, lesser(square(m.p0 + m.b0), square(other + m.b0)));
+  return squares_in_range(s) && is_within(least, margins(d, s));
+}
+
 // Decides by the states at the ends of the step: already within d, or kept apart by their directions.
 template <Kind kind, class R>
 HPCCD_HD Outcome<R> decided_by_ends(const Motion<R>& m, R d, const Look<kind, R>& start, const Look<kind, R>& end) {
