@@ -4,7 +4,7 @@
 import dataclasses
 import io
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -55,6 +55,9 @@ class Picture:
     depths: Sequence[Depth] = ()
     unit: float = 1.0  # the length of the unit of the positions
     planes: int = 0  # how many of the meshes, the last ones, are patches of planes
+    thickness: Mapping[str, float] = dataclasses.field(
+        default_factory=dict
+    )  # of meshes: radius of spheres and capsules
 
 
 @dataclasses.dataclass
@@ -85,9 +88,8 @@ def compose(picture: Picture, history: History | None = None, *, azimuth=-60.0, 
     """The picture as a matplotlib figure; size: of its scene, pixels."""
     picture = _of_drawable_size(picture)
     contacts = (picture.points, picture.toc)
-    image, camera, depth = render(
-        picture.meshes, size, azimuth, elevation, contacts, picture.intersecting, planes=picture.planes
-    )
+    of_scene = {"planes": picture.planes, "thickness": picture.thickness}
+    image, camera, depth = render(picture.meshes, size, azimuth, elevation, contacts, picture.intersecting, **of_scene)
     figure = Figure(figsize=(16, 9), dpi=120, facecolor=BACKGROUND)
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.13, 0.80, 0.735))
@@ -112,16 +114,19 @@ def _of_drawable_size(picture: Picture) -> Picture:
         for d in picture.depths
     ]
     points = np.ldexp(picture.points, exponent)
+    thickness = {name: float(np.ldexp(value, exponent)) for name, value in picture.thickness.items()}
     unit = float(np.ldexp(1.0, -exponent))
-    return dataclasses.replace(picture, meshes=meshes, points=points, contours=contours, depths=depths, unit=unit)
+    return dataclasses.replace(
+        picture, meshes=meshes, points=points, contours=contours, depths=depths, unit=unit, thickness=thickness
+    )
 
 
-def render(meshes, size, azimuth, elevation, contacts=None, intersecting=None, framed=None, planes=0):
+def render(meshes, size, azimuth, elevation, contacts=None, intersecting=None, framed=None, planes=0, thickness=None):
     """(image (h,w,4) sRGB with alpha, camera, depth (h,w)) of meshes [(name, vertices, faces, edges)].
 
     contacts: (points (N,3), times of impact (N,)), around which surfaces are tinted. intersecting: as of `Picture`.
     framed: (N,3) points that are in view; None: all. planes: as of `Picture`: only their edges are drawn where the view
-    is from outside the half-space, which would hide the meshes; they cast no shadow.
+    is from outside the half-space, which would hide the meshes; they cast no shadow. thickness: as of `Picture`.
     """
     vertices = np.concatenate([np.asarray(v, dtype=np.float64) for _, v, *_ in meshes])
     sizes = [len(v) for _, v, *_ in meshes]
@@ -132,9 +137,14 @@ def render(meshes, size, azimuth, elevation, contacts=None, intersecting=None, f
     paint = _paint(vertices, faces, contacts, intersecting)
     extent = float(np.ptp(vertices, axis=0).max())
     first, last = (sum(len(mesh[2]) for mesh in meshes[:count]) for count in (len(meshes) - planes, len(meshes)))
+    thick = np.repeat([(thickness or {}).get(name, 0.0) for name, *_ in meshes], sizes)
+    radii, single = np.maximum(thick, RADIUS * extent), alone(meshes, sizes)
+    radii[single] = np.maximum(thick[single], 2 * RADIUS * extent)
+    ends = np.unique(edges[thick[edges[:, 0]] >= RADIUS * extent])  # of capsules
+    round_ = np.concatenate([single, ends])
     for around, sides, coloured_as in (
-        tubes(vertices, edges, RADIUS * extent),
-        beads(vertices, alone(meshes, sizes), 2 * RADIUS * extent),
+        tubes(vertices, edges, radii[edges[:, 0]]),
+        beads(vertices, round_, radii[round_]),
     ):
         faces = np.concatenate([faces, sides + len(vertices)])
         vertices, colours = np.concatenate([vertices, around]), np.concatenate([colours, colours[coloured_as]])

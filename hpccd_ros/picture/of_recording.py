@@ -59,6 +59,7 @@ def draw_step(
         contours=[] if intersecting is None else _seen(intersecting.contours, step, meshes),
         depths=[] if intersecting is None else _seen(intersecting.depths, step, meshes),
         planes=sum(faces is PATCH_FACES for _, _, faces, _ in meshes),
+        thickness=dict(step.thickness),
     )
     context = None
     if history is not None and len(history.steps) > 1:

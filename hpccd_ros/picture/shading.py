@@ -4,6 +4,7 @@ are thin tubes, as a line has no surface to shade."""
 
 import numpy as np
 
+import hpccd_core as hc
 from hpccd_ros.picture.camera import LightCamera
 from hpccd_ros.picture.raster import rasterize
 
@@ -126,13 +127,13 @@ SIDES = 5
 RADIUS = 0.0035  # of the scene's extent
 
 
-def tubes(vertices: np.ndarray, edges: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def tubes(vertices: np.ndarray, edges: np.ndarray, radii: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Positions (N,3), faces (F,3) of these, and for each of them the vertex (N,) whose colour it has.
 
-    vertices: (V,3). edges: (E,2), indices of them. One without length has no tube.
+    vertices: (V,3). edges: (E,2), indices of them. radii: (E,). An edge without length has no tube.
     """
     length = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)
-    edges, length = edges[length > 0], length[length > 0]
+    edges, radii, length = edges[length > 0], radii[length > 0], length[length > 0]
     ends = vertices[edges]
     along = (ends[:, 1] - ends[:, 0]) / length[:, None]
     # Across the axis along which the edge goes least, so that the cross product does not vanish.
@@ -142,7 +143,7 @@ def tubes(vertices: np.ndarray, edges: np.ndarray, radius: float) -> tuple[np.nd
     second = np.cross(along, first)
     angle = np.arange(SIDES) * 2 * np.pi / SIDES
     ring = np.cos(angle)[:, None] * first[:, None] + np.sin(angle)[:, None] * second[:, None]  # (E, SIDES, 3)
-    positions = ends[:, :, None] + radius * ring[:, None]  # (E, 2, SIDES, 3)
+    positions = ends[:, :, None] + radii[:, None, None, None] * ring[:, None]  # (E, 2, SIDES, 3)
     low = np.arange(SIDES)
     high, next_low = low + SIDES, (low + 1) % SIDES
     quads = np.concatenate([np.stack([low, next_low, high], 1), np.stack([high, next_low, next_low + SIDES], 1)])
@@ -150,10 +151,17 @@ def tubes(vertices: np.ndarray, edges: np.ndarray, radius: float) -> tuple[np.nd
     return positions.reshape(-1, 3), faces.reshape(-1, 3), np.repeat(edges.reshape(-1), SIDES)
 
 
-def beads(vertices: np.ndarray, numbers: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Octahedra around some of the vertices, as `tubes` returns them. numbers: (N,), indices of these vertices."""
-    corners = radius * np.concatenate([np.eye(3), -np.eye(3)])
-    octants = [[x, y, z] if (x + y + z) % 2 else [y, x, z] for x in (0, 3) for y in (1, 4) for z in (2, 5)]
-    faces = np.array(octants) + len(corners) * np.arange(len(numbers))[:, None, None]
-    positions = vertices[numbers][:, None] + corners
+# Beads that are drawn round: more of them are octahedra.
+MOST_ROUND = 5_000
+
+
+def beads(vertices: np.ndarray, numbers: np.ndarray, radii: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Balls around some of the vertices, as `tubes` returns them. numbers, radii: (N,), indices of these vertices."""
+    corners, triangles = hc.shapes.icosphere(2)
+    if len(numbers) > MOST_ROUND:
+        corners = np.concatenate([np.eye(3), -np.eye(3)])
+        octants = [[x, y, z] if (x + y + z) % 2 else [y, x, z] for x in (0, 3) for y in (1, 4) for z in (2, 5)]
+        triangles = np.array(octants)
+    faces = triangles.astype(np.int64) + len(corners) * np.arange(len(numbers))[:, None, None]
+    positions = vertices[numbers][:, None] + radii[:, None, None] * corners
     return positions.reshape(-1, 3), faces.reshape(-1, 3), np.repeat(numbers, len(corners))

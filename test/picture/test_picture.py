@@ -13,7 +13,7 @@ from hpccd_ros.detect.plane_patch import FACES, OUTLINE, patch
 from hpccd_ros.detect.scene import PlaneSettings, SceneBuilder
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.frames.types import NO_EDGES, MeshSettings, Topology
-from hpccd_ros.picture import contacts, curves, panels, tint
+from hpccd_ros.picture import contacts, curves, panels, shading, tint
 from hpccd_ros.picture.camera import Camera
 from hpccd_ros.picture.intersecting import IntersectingFaces
 from hpccd_ros.picture.of_recording import separation_fact
@@ -122,10 +122,12 @@ def test_a_plane_is_drawn_from_within_its_half_space_only():
 def test_edges_are_drawn_as_tubes_around_them():
     points = np.random.default_rng(10).normal(size=(20, 3))
     edges = np.array([[0, 1], [2, 2], [3, 4], [5, 3]])
-    around, faces, coloured_as = tubes(points, edges, 0.1)
+    radii = np.array([0.1, 0.2, 0.3, 0.4])
+    around, faces, coloured_as = tubes(points, edges, radii)
     with_length = edges[[0, 2, 3]]
     assert sorted(set(coloured_as)) == [0, 1, 3, 4, 5] and len(around) == len(coloured_as)
-    assert np.allclose(np.linalg.norm(around - points[coloured_as], axis=1), 0.1)
+    of_each = np.repeat(radii[[0, 2, 3]], len(around) // 3)
+    assert np.allclose(np.linalg.norm(around - points[coloured_as], axis=1), of_each)
     along = np.repeat(points[with_length[:, 1]] - points[with_length[:, 0]], len(around) // len(with_length), axis=0)
     assert np.allclose(np.einsum("nx,nx->n", around - points[coloured_as], along), 0, atol=1e-12)
     assert faces.min() == 0 and faces.max() == len(around) - 1
@@ -134,18 +136,38 @@ def test_edges_are_drawn_as_tubes_around_them():
     assert 0.002 < (image[..., 3] > 0.5).mean() < 0.1
 
 
-def test_points_are_drawn_as_beads_around_them():
+@pytest.mark.parametrize("round_, corners, triangles", [(2, 42, 80), (1, 6, 8)])
+def test_points_are_drawn_as_beads_around_them(monkeypatch, round_, corners, triangles):
+    monkeypatch.setattr(shading, "MOST_ROUND", round_)
     points = np.random.default_rng(11).normal(size=(9, 3))
-    around, faces, coloured_as = beads(points, np.array([2, 5]), 0.1)
-    assert coloured_as.tolist() == [2] * 6 + [5] * 6
-    assert np.allclose(np.linalg.norm(around - points[coloured_as], axis=1), 0.1)
+    around, faces, coloured_as = beads(points, np.array([2, 5]), np.array([0.1, 0.2]))
+    assert coloured_as.tolist() == [2] * corners + [5] * corners
+    radii = np.linalg.norm(around - points[coloured_as], axis=1)
+    assert np.allclose(radii, np.repeat([0.1, 0.2], corners))
     a, b, c = (around[faces[:, i]] for i in range(3))
     outside = np.einsum("nx,nx->n", np.cross(b - a, c - a), a - points[coloured_as[faces[:, 0]]])
-    assert len(faces) == 16 and (outside > 0).all()
+    assert len(faces) == 2 * triangles and (outside > 0).all()
     # A point beside a rope; vertices that a mesh with triangles does not use are not drawn.
     grains = ("grains", np.array([[-1, 0, 0], [0, 0.5, 0], [1, 0, 0.0]]), np.empty((0, 3), int), np.array([[0, 1]]))
     mesh = ("mesh", np.array([[-1, 0, 0], [0, 0.5, 0], [1, 0, 0], [3, 0, 0]]), np.array([[0, 1, 2]]), NO_EDGES)
     assert contacts.alone([grains, mesh], [3, 4]).tolist() == [2]
+
+
+def test_spheres_and_capsules_have_their_thickness():
+    one = ("one", np.array([[0, 0, 0.0]]), np.empty((0, 3), int), NO_EDGES)
+    rod = ("rod", np.array([[0, 0, 1.0], [0, 0, 2.0]]), np.empty((0, 3), int), np.array([[0, 1]]))
+    framed = np.array([[-1, -1, -1], [1, 1, 3.0]])
+    *_, camera, depth = contacts.render([one, rod], (320, 200), 0, 0, framed=framed, thickness={"one": 0.4, "rod": 0.2})
+    for place, seen in (
+        ([0, 0.38, 0], True),
+        ([0, 0.43, 0], False),
+        ([0, 0.13, 1.5], True),  # of a tube with five sides
+        ([0, 0.22, 1.5], False),
+        ([0, 0, 2.18], True),
+        ([0, 0, 2.23], False),
+    ):
+        column, row, _ = camera.project(np.array([place], float))[0].astype(int)
+        assert np.isfinite(depth[row, column]) == seen, place
 
 
 def test_contacts_are_drawn_where_they_project_to_in_the_colour_of_their_time():
