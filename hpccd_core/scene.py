@@ -44,6 +44,7 @@ class Scene:
     def __init__(self) -> None:
         self._core = _core.Scene()
         self._ids: dict[str, int] = {}
+        self._planes: set[int] = set()  # their numbers
         self._calls: list[tuple[str, tuple[Any, ...]]] = []  # of the core, in order: a copy repeats them
         self._layout: MeshLayout | None = None  # None: not known since a mesh was added
 
@@ -424,11 +425,14 @@ class Scene:
         rows = arguments.index_rows("vf", vf, 2), arguments.index_rows("ee", ee, 4), arguments.index_rows("ef", ef, 3)
         self._repeat("ignore_features", tuple(array.copy() for array in rows))
 
+    # Not from the layout, which a scene that grows between filters would make anew for each.
     def _n_vertices_of(self, number: int) -> int:
-        return int(np.diff(self.layout.vertex_offsets)[number])
+        last = number + 1 == len(self._ids)
+        return (self.n_vertices if last else self._core.first_vertex(number + 1)) - self._core.first_vertex(number)
 
     def _n_faces_of(self, number: int) -> int:
-        return int(np.diff(self.layout.face_offsets)[number])
+        last = number + 1 == len(self._ids)
+        return (self.n_faces if last else self._core.first_face(number + 1)) - self._core.first_face(number)
 
     def _call(self, name: str, mesh_a: MeshName, mesh_b: MeshName, *values: Any) -> None:
         pair = self._number("mesh_a", mesh_a), self._number("mesh_b", mesh_b)
@@ -444,11 +448,14 @@ class Scene:
         number = getattr(self._core, name)(*given)
         if name in ("add_mesh", "add_plane"):
             self._ids[values[0]], self._layout = number, None
+        if name == "add_plane":
+            self._planes.add(number)
         self._calls.append((name, values))
 
     def __getstate__(self) -> dict[str, Any]:
         """The calls, and attributes that a user or a derived class added."""
-        return {name: value for name, value in vars(self).items() if name not in ("_core", "_ids", "_layout")}
+        made = ("_core", "_ids", "_planes", "_layout")
+        return {name: value for name, value in vars(self).items() if name not in made}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         Scene.__init__(self)
@@ -482,7 +489,7 @@ class Scene:
 
     def _number_of_mesh(self, name: str, mesh: MeshName) -> int:
         number = self._number(name, mesh)
-        if number in self.layout.planes:
+        if number in self._planes:
             plane = self.mesh_names[number]
             raise ValueError(f"{name}: {plane!r} is a plane, which has no faces; use ignore_pair")
         return number
@@ -508,10 +515,8 @@ class Scene:
         if self._layout is None:
             firsts = [(self._core.first_vertex(k), self._core.first_face(k)) for k in self._ids.values()]
             offsets = np.array([*firsts, (self.n_vertices, self.n_faces)], np.int64)
-            planes = [self._ids[values[0]] for name, values in self._calls if name == "add_plane"]
-            self._layout = MeshLayout(
-                tuple(self._ids), offsets[:, 0].copy(), offsets[:, 1].copy(), np.array(planes, np.uint32)
-            )
+            planes = np.array(sorted(self._planes), np.uint32)
+            self._layout = MeshLayout(tuple(self._ids), offsets[:, 0].copy(), offsets[:, 1].copy(), planes)
         return self._layout
 
     @overload

@@ -321,6 +321,28 @@ def test_points_are_edges_of_one_vertex():
     assert near.vv.tolist() == [[0, 1], [1, 2]] and near.ve.tolist() == [[0, 3, 4], [2, 3, 4]]
 
 
+@pytest.mark.parametrize("what", ["single pairs", "meshes"])
+def test_time_grows_with_the_calls_only(what):
+    scene = hc.Scene()
+    scene.add_mesh("cloth", hc.shapes.grid(100, 100)[1])
+    n = 10_000 if what == "single pairs" else 300
+
+    def some(begin):
+        start = time.process_time()
+        for k in range(begin, begin + n):
+            if what == "single pairs":
+                scene.ignore_features(vf=[[k % 10_000, 7 * k % 20_000]], ee=[[0, 1, 2, 3]])
+            else:
+                scene.add_mesh(str(k), [[0, 1, 2]])
+                scene.ignore_within(str(k), rings=1)
+                scene.ignore_within(str(k), rest_vertices=np.eye(3), distance=0.1)
+                scene.ignore_faces(str(k), [0], "cloth")
+        return time.process_time() - start
+
+    times = [some(k * n) for k in range(7)]
+    assert min(times[4:]) < 2 * max(times[:2])  # 4 times as long while each call copied the rows, or meshes, before
+
+
 def test_copies_and_pickles():
     meshes, motion, filters = of(random_scenes.many_meshes, 10)
     scene = filters.apply(meshes.scene())

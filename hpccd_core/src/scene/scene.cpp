@@ -54,6 +54,11 @@ void append(std::vector<std::array<std::uint32_t, corners>>& all,
   if (larger.capacity() > 0) all.swap(larger);
 }
 
+// At least doubles a capacity that does not suffice: many calls with few rows take linear time.
+void make_room(auto& rows, std::size_t n) {
+  if (rows.capacity() < rows.size() + n) rows.reserve(std::max(rows.size() + n, 2 * rows.size()));
+}
+
 // For filters of features.
 void require_no_plane(const Scene::Mesh& mesh) {
   if (mesh.plane) throw InvalidArgument("mesh: '" + mesh.name + "' is a plane, which has no faces; use ignore_pair()");
@@ -184,9 +189,7 @@ void Scene::ignore_features(std::span<const std::array<std::uint32_t, 2>> vf,
   };
   check("vf", vf, 1), check("ee", ee, 4), check("ef", ef, 2);
   // All or nothing.
-  ignored_vf_.reserve(ignored_vf_.size() + vf.size());
-  ignored_ee_.reserve(ignored_ee_.size() + ee.size());
-  ignored_ef_.reserve(ignored_ef_.size() + ef.size());
+  make_room(ignored_vf_, vf.size()), make_room(ignored_ee_, ee.size()), make_room(ignored_ef_, ef.size());
   ignored_vf_.insert(ignored_vf_.end(), vf.begin(), vf.end());
   ignored_ee_.insert(ignored_ee_.end(), ee.begin(), ee.end());
   ignored_ef_.insert(ignored_ef_.end(), ef.begin(), ef.end());
