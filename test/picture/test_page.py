@@ -35,13 +35,14 @@ def steps_of(path, **options):
         return list(Replay(recording, recorded_setup.of_recording(recording), outputs=("points",), **options).steps())
 
 
-def page_of(path, target, *, names=None, shown=lambda number: True, **options):
-    """The page of a recording, written here; names: of its meshes, instead of their own."""
+def page_of(path, target, *, names=None, shown=lambda number: True, thickness=(), **options):
+    """The page of a recording, written here; names, thickness: of its meshes, instead of their own."""
     with Recording(path) as recording:
         setup = recorded_setup.of_recording(recording)
         replay = Replay(recording, setup, outputs=("points",))
         page = RecordingPage(replay, names or setup.mesh_names, options.pop("title", "a title"), **options)
         for number, step in enumerate(replay.steps()):
+            step.thickness = thickness
             page.add(step, shown(number))
         target.write_text(document(*page.described(), three()), encoding="utf-8")
     return Page(target)

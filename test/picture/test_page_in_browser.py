@@ -254,6 +254,32 @@ def test_edges_are_drawn_as_lines(browser, small_bag, tmp_path):
     assert "91 edges" in browser.evaluate("document.getElementById('meshes').textContent")
 
 
+def test_points_with_a_thickness_are_drawn_as_spheres(browser, small_bag, tmp_path):
+    def change(_, message, decoded):
+        if message.topic == "/meshes/ball/topology":
+            decoded.faces = np.zeros(0, np.uint32)
+        return decoded
+
+    rewrite(small_bag, tmp_path / "points.mcap", change)
+    seen, rows = [], []
+    for radius in (0.0, 0.04, 0.08):
+        page_of(tmp_path / "points.mcap", tmp_path / "run.html", thickness=(("ball", radius),))
+        scene = opened(browser, tmp_path / "run.html")
+        browser.evaluate("document.getElementById('show-contacts').click()")
+        scene.show(0, False)
+        browser.press("Home", 36)
+        at_first = scene.drawn()[100:]
+        browser.press("End", 35)
+        seen.append(scene.drawn()[100:].mean())
+        rows.append((at_first != scene.drawn()[100:]).mean())
+    assert 0 < 5 * seen[0] < seen[1] < seen[2]
+    assert rows[1] > 0, "they move"
+    browser.evaluate("document.getElementById('facts').textContent = 'long words '.repeat(40)")
+    lines = "(name => (name.selectNodeContents(document.getElementById('name')), name.getClientRects().length))"
+    assert browser.evaluate(f"{lines}(document.createRange())") == 1, "the name stays on its line"
+    assert browser.said == []
+
+
 def test_meshes_without_faces_are_drawn_as_points_and_missing_frames_not_at_all(browser, small_bag, tmp_path):
     def change(index, message, decoded):
         if message.topic == "/meshes/ball/topology":

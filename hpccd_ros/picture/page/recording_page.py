@@ -63,6 +63,7 @@ class RecordingPage:
         self._steps: list[dict] = []
         self._patches: dict = {}
         self._planes: set[int] = set()  # numbers of meshes that are planes
+        self._thickness: dict[str, float] = {}  # of meshes, the last one that they had
         self._first_end: int | None = None
         self._numbers: list[int] = []  # of all steps of the recording
         self._missing = self._differ = self._truncated = self._cut = 0
@@ -83,6 +84,7 @@ class RecordingPage:
         if not shown:
             return
         self._add_positions(step)
+        self._thickness |= dict(step.thickness)
         marked, contours, depths = [np.empty(0, bool)] * len(self._meshes), [], []
         if self._intersecting is not None and step.end_frame is not None:
             marked = self._intersecting.of(step.end_frame.topologies, step.end_frame.vertices, step.rest)
@@ -182,8 +184,8 @@ class RecordingPage:
             if mesh.name in self._seen:
                 group += ": collision geometry" if collision else ""
             hidden = collision and mesh.name in self._seen
-            plane = number in self._planes
-            meshes.append({**description, "colour": colour, "group": group, "hidden": hidden, "plane": plane})
+            of_scene = {"plane": number in self._planes, "thickness": self._thickness.get(mesh.name, 0.0)}
+            meshes.append({**description, "colour": colour, "group": group, "hidden": hidden, **of_scene})
             blobs |= {f"mesh-{number}-{name}": data for name, data in of_mesh.items()}
         gaps = _gaps(self._numbers)
         contacts, columns = self._contacts.described()

@@ -38,12 +38,13 @@ class Surfaces {
     for (const mesh of recording.meshes.keys()) {
       const shown = recording.shown(mesh, step);
       if (!shown || !shown.topology.vertices || !this.visible[mesh]) continue;
-      const drawn = (this.drawn[mesh][shown.number] ??= this.make(shown.topology, this.own[mesh], recording.meshes[mesh].plane));
+      const drawn = (this.drawn[mesh][shown.number] ??= this.make(shown.topology, this.own[mesh], recording.meshes[mesh]));
       const { position } = drawn.geometry.attributes;
       const start = shown.frame * shown.topology.vertices;
       recording.place(recording.meshes[mesh], shown.topology.positions, start, start + position.count, position.array);
       position.needsUpdate = true;
       if (shown.topology.faces) drawn.geometry.computeVertexNormals();
+      drawn.place?.();
       this.group.add(drawn.object);
       if (drawn.lines) this.group.add(drawn.lines);
       const marked = recording.intersectingFaces(mesh, step);
@@ -52,7 +53,7 @@ class Surfaces {
     }
   }
 
-  make(topology, colour, plane) {
+  make(topology, colour, { plane, thickness }) {
     const geometry = new THREE.BufferGeometry();
     const places = new THREE.BufferAttribute(new Float32Array(3 * topology.vertices), 3);
     geometry.setAttribute("position", places.setUsage(THREE.DynamicDrawUsage));
@@ -61,6 +62,7 @@ class Surfaces {
     geometry.setIndex(topology.faces ? new THREE.BufferAttribute(topology.indices, 1) : null);
     const material = plane ? this.planes : this.material;
     const object = topology.faces ? new THREE.Mesh(geometry, material) : new THREE.Points(geometry, this.points);
+    if (!topology.faces && !topology.edges && thickness > 0) return this.makeSpheres(geometry, topology, colour, thickness);
     const edges = new THREE.Mesh(geometry, this.edges);
     object.receiveShadow = true;
     object.castShadow = !plane;
@@ -80,6 +82,25 @@ class Surfaces {
     object.receiveShadow = true;
     object.frustumCulled = false;
     return object;
+  }
+
+  // One sphere around each point. `place`: to the positions of `geometry`.
+  makeSpheres(geometry, topology, colour, thickness) {
+    const radius = thickness / this.recording.scale;
+    const material = new THREE.MeshStandardMaterial({ color: new THREE.Color(...colour), roughness: 0.55, metalness: 0 });
+    const [around, above] = topology.vertices > 5000 ? [6, 4] : [16, 12];
+    const object = new THREE.InstancedMesh(new THREE.SphereGeometry(radius, around, above), material, topology.vertices);
+    object.castShadow = object.receiveShadow = true;
+    object.frustumCulled = false;
+    const matrix = new THREE.Matrix4();
+    const place = () => {
+      const { array } = geometry.attributes.position;
+      for (let i = 0; i < topology.vertices; i++) {
+        object.setMatrixAt(i, matrix.makeTranslation(array[3 * i], array[3 * i + 1], array[3 * i + 2]));
+      }
+      object.instanceMatrix.needsUpdate = true;
+    };
+    return { geometry, object, place };
   }
 
   makeLines(geometry, topology) {
