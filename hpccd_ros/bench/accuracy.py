@@ -137,7 +137,7 @@ def details(text: str) -> list[float]:
         except ValueError:
             found.append(math.nan)
         if not 0 < found[-1] < 1:
-            raise UserError(f"--detail {text}: {word!r} is no part of the faces; name parts between 0 and 1, as in 0.1")
+            raise UserError(f"--detail {text}: {word!r} must be a number above 0 and below 1, as in 0.1")
     if found:
         try:
             simplifier()
