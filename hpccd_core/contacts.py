@@ -57,6 +57,9 @@ class Contacts(PairsOfWorlds, WithSides):
         Two points (see :meth:`Scene.add_points`), the lower number first.
     ve, ve_toc : ndarray, shape (Q, 3) uint32 and (Q,) float64
         A point, and the vertices of an edge that is in no face, the lower number first.
+    ef : ndarray, shape (K, 3), uint32
+        With `detail`: edges and faces of the coarse meshes that intersect at the start, as in Intersections.ef; their
+        time is 0.
     first_toc : float
         The earliest time of impact; +inf if there are no contacts. With report="any", that of the one contact reported.
     hash : int

@@ -4,7 +4,7 @@
 hpccd info              as text, for bug reports
 hpccd info --json       as JSON, for programs
 hpccd info shirt.obj    counts of a mesh, lengths of its edges, and what disturbs collision detection:
-                        seams of doubled vertices, T-junctions, faces without area; with a remedy for each
+                        doubled vertices, T-junctions, self-intersections and others, with a remedy for each
 """
 
 import json
