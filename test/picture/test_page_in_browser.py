@@ -254,10 +254,11 @@ def test_edges_are_drawn_as_lines(browser, small_bag, tmp_path):
     assert "91 edges" in browser.evaluate("document.getElementById('meshes').textContent")
 
 
-def test_points_with_a_thickness_are_drawn_as_spheres(browser, small_bag, tmp_path):
+@pytest.mark.parametrize("edges", [[], [k + end for k in range(91) for end in (0, 1)]])
+def test_points_and_ropes_with_a_thickness_are_drawn_as_spheres_and_capsules(browser, small_bag, tmp_path, edges):
     def change(_, message, decoded):
         if message.topic == "/meshes/ball/topology":
-            decoded.faces = np.zeros(0, np.uint32)
+            decoded.faces, decoded.edges = np.zeros(0, np.uint32), np.array(edges, np.uint32)
         return decoded
 
     rewrite(small_bag, tmp_path / "points.mcap", change)
@@ -272,7 +273,7 @@ def test_points_with_a_thickness_are_drawn_as_spheres(browser, small_bag, tmp_pa
         browser.press("End", 35)
         seen.append(scene.drawn()[100:].mean())
         rows.append((at_first != scene.drawn()[100:]).mean())
-    assert 0 < 5 * seen[0] < seen[1] < seen[2]
+    assert 0 < (2 if edges else 5) * seen[0] < seen[1] < seen[2]
     assert rows[1] > 0, "they move"
     browser.evaluate("document.getElementById('facts').textContent = 'long words '.repeat(40)")
     lines = "(name => (name.selectNodeContents(document.getElementById('name')), name.getClientRects().length))"

@@ -62,7 +62,7 @@ class Surfaces {
     geometry.setIndex(topology.faces ? new THREE.BufferAttribute(topology.indices, 1) : null);
     const material = plane ? this.planes : this.material;
     const object = topology.faces ? new THREE.Mesh(geometry, material) : new THREE.Points(geometry, this.points);
-    if (!topology.faces && !topology.edges && thickness > 0) return this.makeSpheres(geometry, topology, colour, thickness);
+    if (!topology.faces && thickness > 0) return this.makeCapsules(geometry, topology, colour, thickness);
     const edges = new THREE.Mesh(geometry, this.edges);
     object.receiveShadow = true;
     object.castShadow = !plane;
@@ -84,21 +84,33 @@ class Surfaces {
     return object;
   }
 
-  // One sphere around each point. `place`: to the positions of `geometry`.
-  makeSpheres(geometry, topology, colour, thickness) {
+  // A sphere around each vertex and a tube around each edge. `place`: to the positions of `geometry`.
+  makeCapsules(geometry, { vertices, edges, ends }, colour, thickness) {
     const radius = thickness / this.recording.scale;
     const material = new THREE.MeshStandardMaterial({ color: new THREE.Color(...colour), roughness: 0.55, metalness: 0 });
-    const [around, above] = topology.vertices > 5000 ? [6, 4] : [16, 12];
-    const object = new THREE.InstancedMesh(new THREE.SphereGeometry(radius, around, above), material, topology.vertices);
-    object.castShadow = object.receiveShadow = true;
-    object.frustumCulled = false;
-    const matrix = new THREE.Matrix4();
+    const [around, above] = vertices > 5000 ? [6, 4] : [16, 12];
+    const spheres = new THREE.InstancedMesh(new THREE.SphereGeometry(radius, around, above), material, vertices);
+    const tubes = new THREE.InstancedMesh(new THREE.CylinderGeometry(radius, radius, 1, around, 1, true), material, edges);
+    const object = new THREE.Group();
+    for (const part of [spheres, tubes]) {
+      part.castShadow = part.receiveShadow = true;
+      part.frustumCulled = false;
+      if (part.count) object.add(part);
+    }
+    const matrix = new THREE.Matrix4(), turn = new THREE.Quaternion(), size = new THREE.Vector3(1, 1, 1);
+    const [from, to, along] = [0, 1, 2].map(() => new THREE.Vector3()), up = new THREE.Vector3(0, 1, 0); // of a cylinder
     const place = () => {
       const { array } = geometry.attributes.position;
-      for (let i = 0; i < topology.vertices; i++) {
-        object.setMatrixAt(i, matrix.makeTranslation(array[3 * i], array[3 * i + 1], array[3 * i + 2]));
+      for (let i = 0; i < vertices; i++) {
+        spheres.setMatrixAt(i, matrix.makeTranslation(array[3 * i], array[3 * i + 1], array[3 * i + 2]));
       }
-      object.instanceMatrix.needsUpdate = true;
+      for (let i = 0; i < edges; i++) {
+        along.subVectors(to.fromArray(array, 3 * ends[2 * i + 1]), from.fromArray(array, 3 * ends[2 * i]));
+        size.y = along.length();
+        turn.setFromUnitVectors(up, along.normalize());
+        tubes.setMatrixAt(i, matrix.compose(from.add(to).multiplyScalar(0.5), turn, size));
+      }
+      spheres.instanceMatrix.needsUpdate = tubes.instanceMatrix.needsUpdate = true;
     };
     return { geometry, object, place };
   }
