@@ -202,7 +202,8 @@ struct Detector::Impl {
   // Whether results may be returned in the memory that a GPU has written.
   bool gives_in_place(Backend picked) const {
     const Options& o = options();
-    return picked == Backend::gpu && o.worlds == 1 && !Outputs::of_contacts(o).any() && !common.planes.any();
+    return picked == Backend::gpu && o.worlds == 1 && !Outputs::of_contacts(o).any() && !common.planes.any() &&
+           !with_points();
   }
 
   Detection compute(Backend picked, Positions t0, Positions t1) {
