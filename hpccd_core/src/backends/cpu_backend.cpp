@@ -143,9 +143,11 @@ void CpuBackend::begin_motion(Positions t0, Positions t1, Tests tests, MovingTre
   begin(*search_, motion);
   search_->geometry.separations = shared_.separations_now();
   search_->geometry.margin = {shared_.most_separation() + motion.rounding, motion.map.scale};
-  search_->geometry.margin_of_none = {motion.rounding, motion.map.scale};
-  search_->geometry.margin_of_one = {1, 1};
-  search_->geometry.kdop_scale = motion.map.scale;
+  if (shared_.common.thickness.uneven()) {
+    search_->geometry.margin_of_none = {motion.rounding, motion.map.scale};
+    search_->geometry.margin_of_one = {1, 1};
+    search_->geometry.kdop_scale = motion.map.scale;
+  }
   search_->geometry.rounded = rounds ? motion.rounded.data() : nullptr;
   search_->excess = Excess(motion, shared_.separations);
   search_->report = !here && o.report == Report::any ? Report::all : o.report;

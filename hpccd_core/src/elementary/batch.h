@@ -23,8 +23,8 @@ struct Geometry {
   KdopMargin margin = {};                  // of the largest separation
   KdopMargin margin_of_none = {};          // of a separation of 0
   KdopMargin margin_of_one = {};           // of a separation of 1 / kdop_scale, above that of 0
-  double kdop_scale = 0;
-  float until = 2;  // below 1: pairs that cannot touch up to this time may be skipped
+  double kdop_scale = 0;                   // 0: the margin of the largest separation suits all pairs
+  float until = 2;                         // below 1: pairs that cannot touch up to this time may be skipped
 };
 
 template <Kind kind>

@@ -2,6 +2,7 @@
 #include "scene/thickness.h"
 
 #include <algorithm>
+#include <numeric>
 #include <string>
 
 #include "base/coordinate_limits.h"
@@ -46,6 +47,7 @@ ThicknessTable::ThicknessTable(const Scene& scene, const Features& features)
       features_(features),
       given_(scene.meshes().size()),
       largest_of_mesh_(scene.meshes().size()),
+      sum_of_mesh_(scene.meshes().size()),
       thick_(scene.meshes().size()) {
   for (std::uint32_t m = 0; m < given_.size(); ++m)
     if (const auto& values = scene.meshes()[m].thickness; !values.empty()) set(m, values);
@@ -96,6 +98,11 @@ void ThicknessTable::set(std::uint32_t number, std::span<const double> values) {
                   of_edge_.begin() + (end_edge - features_.edges.begin()), positive);
   thick_[number] = all ? Thick::all : largest > 0 ? Thick::some : Thick::none;
   largest_ = std::ranges::max(largest_of_mesh_);
+  sum_of_mesh_[number] = std::accumulate(values.begin(), values.end(), 0.0) * (each ? 1 : elements_of(mesh).n);
+  const double sum = std::accumulate(sum_of_mesh_.begin(), sum_of_mesh_.end(), 0.0);
+  double n = 0;
+  for (const Scene::Mesh& m : scene_.meshes()) n += elements_of(m).n;
+  uneven_ = sum < 0.5 * largest_ * n;
 }
 
 void ThicknessTable::set_each_face(const Scene::Mesh& mesh, std::span<const double> values) {

@@ -32,6 +32,8 @@ class ThicknessTable {
   std::uint64_t version() const { return version_; }
 
   bool any() const { return largest_ > 0; }
+  // Whether a few elements are much thicker than most: the largest value is more than twice the mean.
+  bool uneven() const { return uneven_; }
   // The largest sum of two.
   double most_of_two() const { return 2 * largest_; }
   // By mesh: the largest of its features. Empty if all are zero.
@@ -55,9 +57,10 @@ class ThicknessTable {
   std::vector<std::vector<double>> given_;                   // by mesh
   std::vector<double> of_vertex_, of_edge_, of_face_;        // empty until a value is not zero
   std::vector<std::array<std::uint32_t, 3>> edges_of_face_;  // found when faces first have a thickness each
-  std::vector<double> largest_of_mesh_, none_;
+  std::vector<double> largest_of_mesh_, sum_of_mesh_, none_;
   std::vector<Thick> thick_, no_mesh_;
   double largest_ = 0;
+  bool uneven_ = false;
   std::uint64_t version_ = 1;
 };
 

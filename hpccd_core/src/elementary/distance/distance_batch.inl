@@ -24,10 +24,9 @@ HPCCD_HD double separation_at(const Geometry& g, std::uint32_t at, Kind kind, st
   return g.separations.between(v[0], v[2]) + g.separations.thickness_of(kind, first, second);
 }
 
-HPCCD_HD bool differ(const Separations& s) { return s.of_candidates || s.of_meshes || s.thick(); }
-
-// A margin for each pair: with that of the largest separation, few pairs would be rejected where a few faces are much
-// thicker than most. Rounding to floats, here of three values and a sum, is within the 1e-6 that KdopMargin adds.
+// A margin for each pair: with that of the largest separation, few pairs are rejected where a few faces are much
+// thicker than most. Where they are not, looking up the thickness takes longer than it saves. Rounding to floats, here
+// of three values and a sum, is within the 1e-6 that KdopMargin adds.
 template <Kind kind>
 struct OwnMargin {
   const Geometry& g;
@@ -41,7 +40,8 @@ struct OwnMargin {
 // Lanes filled by of_lane(lane), for separations that differ between pairs.
 template <class OfLane>
 HPCCD_HD Double separations(const Geometry& g, OfLane&& of_lane) {
-  if (!differ(g.separations)) return Double(g.separations.uniform);
+  if (!g.separations.of_candidates && !g.separations.of_meshes && !g.separations.thick())
+    return Double(g.separations.uniform);
   alignas(64) double d[double_width];
   for (int lane = 0; lane < double_width; ++lane) d[lane] = of_lane(lane);
   Double r;
@@ -54,7 +54,8 @@ void test_separation(const Geometry& g, const std::uint32_t* first, const std::u
                      BatchResult& result) {
   result.n_contacts = result.n_undecided = 0;
   PairList list;
-  if (differ(g.separations))
+  const bool uneven = g.kdop_scale > 0;
+  if (uneven)
     list_pairs<kind>(ApartByMore<OwnMargin<kind>>{{g, first, second}}, g, g.vertices, first, second, n, list);
   else
     list_pairs<kind>(ApartByMore<OneMargin>{{load16(g.margin.in)}}, g, g.vertices, first, second, n, list);
@@ -81,8 +82,7 @@ void test_separation(const Geometry& g, const std::uint32_t* first, const std::u
   for_lanes<kind, Double>(g, list, all, [&](Lanes m, const LaneNumbers<All>& of) {
     const Double d = separations_of(of);
     unsigned near = 0;
-    if (g.separations.thick() && any(Double(9.0) * (d * d) > dot(m.a0, m.a0)))
-      near = bits(corners_within<kind>(m, d)) & of.valid;
+    if (uneven && any(Double(9.0) * (d * d) > dot(m.a0, m.a0))) near = bits(corners_within<kind>(m, d)) & of.valid;
     within_at_start(near, of);
     n_near += static_cast<unsigned>(__builtin_popcount(near));
     if (near != of.valid) append(beside, of, of.valid & ~near & ~bits(planes_stay_apart(m, d)));
