@@ -135,10 +135,10 @@ class DetailedCore:
         return worst
 
     def _of_end(self, mesh: DetailedMesh, level: Level, end: NDArray[Any], most: float) -> Doubles:
-        if self._largest is None:
-            found = level.mesh.deviations(end, mesh.slice.start, None, most, self.pool)
-            if found is not None:
-                return found
+        # Whether coordinates were checked must not change the bound: it depends on these positions only.
+        found = level.mesh.deviations(end, mesh.slice.start, None, most, self.pool)
+        if found is not None:
+            return found
         largest = float(self._checked_coordinates()[id(end)][mesh.number])
         found = level.mesh.deviations(end, mesh.slice.start, largest, most, self.pool)
         assert found is not None
@@ -176,6 +176,7 @@ class DetailedCore:
             ratio, deviations = 1.0, np.broadcast_to(0.0, len(mesh.faces))
             if mesh.detail is not None:
                 if mesh.rest is None:
+                    self._checked_coordinates()  # what is rejected must not decide how coarse the mesh is
                     mesh.rest = np.array(ends[0][mesh.slice], np.float64)
                 error = np.inf if mesh.detail.error is None else mesh.detail.error
                 for tried in RATIOS if mesh.detail.ratio is None else (mesh.detail.ratio,):

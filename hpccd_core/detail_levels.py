@@ -74,9 +74,10 @@ def propose(faces: Indices, rest: NDArray[np.float64], ratio: float) -> CoarseFa
     places, coarse, cluster = fast_simplification.replay_simplification(rough, triangles, collapses)
     if not len(coarse):  # it may collapse everything
         return as_it_is
-    # In each cluster the vertex nearest to the place of the collapse; of several the first.
+    # In each cluster the vertex nearest to the place of the collapse; of several the first. On the border of the mesh,
+    # one of its corners, or any on it: a coarse border beside that of the mesh leaves its faces half an edge away.
     away = np.linalg.norm(points - places[cluster], axis=1)
-    order = np.lexsort((np.arange(len(used)), away, cluster))
+    order = np.lexsort((np.arange(len(used)), away, -_on_border(points, triangles), cluster))
     clusters, first = np.unique(cluster[order], return_index=True)
     vertex_of = np.full(len(places), _NO_VERTEX)
     vertex_of[clusters] = used[order[first]]
@@ -84,6 +85,21 @@ def propose(faces: Indices, rest: NDArray[np.float64], ratio: float) -> CoarseFa
     alive[coarse] = True
     survivor[used] = np.where(alive[cluster], vertex_of[cluster], _NO_VERTEX)
     return CoarseFaces(np.ascontiguousarray(vertex_of[coarse], np.uint32), survivor)
+
+
+def _on_border(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(V,): 1 for vertices on an edge of one face only, 2 where that border turns or branches, 0 for others."""
+    sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    edges, count = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
+    border = edges[count == 1]
+    n_edges = np.bincount(border.ravel(), minlength=len(points))
+    along = points[border[:, 1]] - points[border[:, 0]]
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), np.finfo(float).tiny)
+    away = np.zeros_like(points)  # the sum of both directions away from a vertex: 0 on a straight border
+    np.add.at(away, border[:, 0], along)
+    np.add.at(away, border[:, 1], -along)
+    turns = (n_edges != 2) | (np.linalg.norm(away, axis=1) > 0.5)
+    return np.where(n_edges == 0, 0, np.where(turns, 2, 1))
 
 
 def _noise(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -33,6 +33,7 @@ def of_meshes(detail: object, names: tuple[str, ...], n_vertices: list[int], n_f
         If a mesh is unknown or has no faces, or a number is invalid.
     """
     if not isinstance(detail, Mapping):
+        _of_mesh("detail", detail, 0)
         detail = {name: detail for name, n in zip(names, n_faces, strict=True) if n}
     numbers = {name: number for number, name in enumerate(names)}
     found: list[MeshDetail | None] = [None] * len(names)

@@ -247,7 +247,7 @@ def draw(rows: list[dict], path: Path) -> None:
     for axis in axes[len(scenes) :]:
         axis.set_axis_off()
     page.supxlabel("ms a step, the least of all rounds", fontsize=9)
-    page.supylabel(f"worst error (0 at {FLOOR:g})", fontsize=9)
+    page.supylabel(f"largest of missed, spurious, error of a time, deviation ({FLOOR:g}: none)", fontsize=9)
     page.legend(marks.values(), marks, loc="outside right center", fontsize=8)
     try:
         with whole_file(path, overwrite=True) as draft:
@@ -258,13 +258,18 @@ def draw(rows: list[dict], path: Path) -> None:
 
 def _draw_settings(axis, found: list[choice.Outcome]) -> None:
     """Those that ask for the same, and the line through their Pareto front."""
+    # The deviation of a coarse mesh is far above all other errors: its marks of all tiers would cover each other.
+    best = max((ACCURACIES.index(o.setting.accuracy) for o in found), default=0)
+    found = [o for o in found if o.setting.detail == choice.FULL or o.setting.accuracy == ACCURACIES[best]]
+    details = sorted({o.setting.detail for o in found})
     for o in found:
         setting, colour = o.setting, f"C{ACCURACIES.index(o.setting.accuracy)}"
         look = {"marker": MARKERS[setting.asked], "fillstyle": FILLS[setting.backend], "markersize": 6}
         axis.plot(o.ms, _worst(o), color=colour, alpha=0.8, linestyle="none", **look)
-        if setting.detail != choice.FULL and setting.accuracy == "exact":
-            below = setting.asked == choice.OF_MESHES[-1]
-            place = {"textcoords": "offset points", "xytext": (3, -11 if below else 5), "fontsize": 7}
+        if setting.detail != choice.FULL:
+            line = details.index(setting.detail)  # labels of marks side by side lie one above the other
+            up = -12 - 8 * line if setting.asked == choice.OF_MESHES[-1] else 5 + 8 * line
+            place = {"textcoords": "offset points", "xytext": (0, up), "fontsize": 7, "ha": "center"}
             axis.annotate(f"{setting.detail:g}", (o.ms, _worst(o)), **place)
     least, line = math.inf, []
     for o in sorted(found, key=lambda o: (o.ms, _worst(o))):

@@ -396,6 +396,8 @@ def test_what_is_invalid_or_not_offered_is_named():
         detector.proximity(start, 0.1)
     with pytest.raises(ValueError, match="refine='neighbours'"):
         detector.collision_free_step(start, end)
+    with pytest.raises(TypeError, match="detail: expected a number, got str"):
+        hc.Detector(scene, detail="0.1")
     bad = end.copy()
     bad[40, 1] = np.nan
     with pytest.raises(ValueError, match=r"vertices_t1\[40, 1\] is NaN"):
@@ -504,10 +506,10 @@ def test_a_plane_of_a_detector_with_detail_changes():
         change(detector), change(full)
         found, true = detector.detect(start, end), full.detect(start, end)
         assert np.array_equal(found.vp, true.vp) and np.array_equal(found.vp_toc, true.vp_toc)
-    with pytest.raises(ValueError, match="is no plane"):
+    with pytest.raises(ValueError, match="is a mesh, not a plane"):
         detector.set_plane("ball", (0, 0, 1), 0)
     without, *_ = two_bodies(np.random.default_rng(9))
-    with pytest.raises(ValueError, match="is no plane"):
+    with pytest.raises(ValueError, match="is a mesh, not a plane"):
         hc.Detector(without, detail=0.2).set_plane("sheet", (0, 0, 1), 0)
 
 
@@ -517,3 +519,29 @@ def test_faces_ignored_against_a_plane_leave_the_vertices_of_others():
     found, true = (hc.Detector(scene, **o).detect(start, end) for o in ({"detail": 0.2}, {}))
     sheet = true.vp[true.vp[:, 0] < 169]
     assert 0 < len(sheet) < 169 and np.array_equal(found.vp, true.vp)
+
+
+def test_a_rejected_call_does_not_decide_how_coarse_a_mesh_is():
+    scene, start, end = two_bodies(np.random.default_rng(11), self_collision=False)
+    detector, fresh = (hc.Detector(scene, detail=0.2) for _ in range(2))
+    bad = start.copy()
+    bad[::3] = np.nan
+    for query in (detector.detect, detector.collision_free_step):
+        with pytest.raises(ValueError, match="NaN"):
+            query(bad, end)
+    with pytest.raises(ValueError, match="NaN"):
+        detector.distances(bad)
+    assert detector.detect(start, end) == fresh.detect(start, end)
+    assert np.array_equal(detector.faces, fresh.faces)
+
+
+def test_coarse_borders_lie_on_those_of_the_mesh():
+    vertices, faces = hc.shapes.grid(40, 40)
+    scene = hc.Scene()
+    scene.add_mesh("sheet", faces, self_collision=False)
+    scene.add_mesh("probe", [[0, 1, 2]])
+    probe = np.array([[0.0, 0, 0.1], [1, 0, 0.1], [0, 1, 0.1]])
+    detector = hc.Detector(scene, detail={"sheet": 0.1}, minimum_separation=0.2)
+    found = detector.detect(flat := np.concatenate([vertices, probe]), flat)
+    assert len(found.bounds) and found.bounds.max() < 1e-3 / 20  # of an edge
+    assert len(detector.faces) < 0.4 * len(faces)

@@ -252,14 +252,17 @@ class Mapping {
     const Vec d = at(c) - (at(c.edge[0]) + double{c.r} * (at(c.edge[1]) - at(c.edge[0])));
     return dot(d, d);
   }
-  // The coarse edges from a coarse face at v to one at w: the fewest, and of several such sequences the nearest. False
-  // if that needs too many.
+  // The coarse edges from a coarse face at v to one at w: the nearest sequence of up to four, but no longer one where a
+  // shorter one passes within a tenth of the edge. (Two coarse faces with a common edge may lie on both sides of a
+  // third one, where the way across their common edge is far.) False if there is none.
   bool crossings(std::uint32_t v, std::uint32_t w, std::vector<Corner>& to) const {
     constexpr int most = 4;
     for (const std::uint32_t c : labels_[v])
       if (std::ranges::find(labels_[w], c) != labels_[w].end()) return true;
+    const Vec edge = at(w) - at(v);
+    const double near = 0.01 * dot(edge, edge);
     Sequence best{{}, std::numeric_limits<double>::infinity()}, sequence;
-    for (int n = 1; n <= most && best.cuts.empty(); ++n)
+    for (int n = 1; n <= most && !(best.farthest <= near); ++n)
       for (const std::uint32_t c : labels_[v]) extend(sequence, v, w, c, n, best);
     to = best.cuts;
     return !to.empty();
