@@ -23,13 +23,10 @@ class FullMeshes:
 
     Parameters
     ----------
-    calls : list
-        Of the scene, as in `Scene._calls`.
-    layout : MeshLayout
-        Of the scene.
+    calls, layout, options
+        As of `CoarseScene`.
     meshes : list of DetailedMesh
         Those.
-    options : _core.Options
     features : (bool, bool)
         Kinds of features that are tested.
     """
@@ -109,11 +106,10 @@ class PlanesOfAll:
 
     Parameters
     ----------
-    calls, layout
-        As of `FullMeshes`.
+    calls, layout, options
+        As of `CoarseScene`.
     meshes : list of DetailedMesh
         All of the scene.
-    options : _core.Options
     """
 
     def __init__(self, calls: Calls, layout: MeshLayout, meshes: list[DetailedMesh], options: _core.Options) -> None:

@@ -221,7 +221,7 @@ def test_one_mesh_is_not_asked_which_meshes_touch(product, capsys):
 
 @pytest.mark.parametrize("text", ["2", "0", "few", "0.1,1"])
 def test_a_detail_is_a_part(text):
-    with pytest.raises(UserError, match="name parts between 0 and 1"):
+    with pytest.raises(UserError, match="must be a number above 0 and below 1"):
         accuracy.details(text)
 
 

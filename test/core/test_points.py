@@ -259,6 +259,6 @@ def test_options_of_points():
         scene.add_points("others", 2, thickness=[1.0, 2, 3])
     with pytest.raises(ValueError, match="n"):
         scene.add_points("others", -1)
-    for options in ({"detail": 0.5}, {"results": "device"}):
-        with pytest.raises(ValueError, match="detail|results"):
+    for options, name in (({"detail": {"grains": 0.5}}, "no faces"), ({"results": "device"}, "results")):
+        with pytest.raises(ValueError, match=name):
             hc.Detector(scene, **options)
