@@ -111,7 +111,7 @@ constexpr std::uint32_t no_face = 0xFFFFFFFFu;
 // its point lies.
 struct Corner {
   std::uint32_t v, w;
-  Weight s, r;
+  Weight s{}, r{};
   Edge edge{};                             // the coarse edge
   std::array<std::uint32_t, 2> of_edge{};  // the coarse faces at it
   std::span<const std::uint32_t> of_vertex{};
