@@ -236,7 +236,7 @@ def draw(rows: list[dict], path: Path) -> None:
         for asked in (a.name for a in choice.ASKED):
             mine = [o for o in found if o.setting.asked == asked]
             _draw_settings(axis, mine)
-        axis.set(xscale="log", yscale="log", ylim=(FLOOR / 5, 5))
+        axis.set(xscale="log", yscale="log", ylim=(FLOOR / 5, 50))
         axis.set_title(scene, fontsize=9)
         axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axis.xaxis.set_major_formatter("{x:g}")
