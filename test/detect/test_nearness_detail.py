@@ -2,6 +2,7 @@
 """Stop on coarse faces is never later than on all faces, whatever the motion, the thickness and the start. No ROS."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import pytest
 import hpccd_core as hc
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.nearness import Nearness
-from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.detect.scene import PlaneSettings, SceneBuilder
 from hpccd_ros.frames.types import MeshSettings, SceneFrame, Topology
 
 pytest.importorskip("fast_simplification", reason="coarse faces need the extra detail")
@@ -49,6 +50,22 @@ def test_never_later_than_without(seed):
         if near[0] is None and of_coarse[0] is None:
             assert coarse.inside(start, end) == full.inside(start, end)
             assert coarse.slowdown(start, end, distance, 1.0) == full.slowdown(start, end, distance, 1.0)
+
+
+def test_never_later_than_without_beside_a_plane():
+    builder = replace(BUILDER, planes=(PlaneSettings("floor", (0.0, 0.1, 1.0), -0.6),))
+    thick = replace(OPTIONS, thickness=(("ball", 0.05),))
+    coarse, full = Nearness(builder, thick, 0.1, DETAIL), Nearness(builder, thick, 0.1)
+    of_planes = of_none = 0
+    for seed in range(8):
+        for start, end in pairwise(frames(np.random.default_rng(seed))):
+            near, of_coarse = full.within(start, end)[0], coarse.within(start, end)[0]
+            assert near is None or of_coarse is not None
+            of_planes += of_coarse is not None and "floor" in of_coarse
+            if near is None and of_coarse is None:
+                of_none += 1
+                assert coarse.slowdown(start, end, 0.1, 1.0) == full.slowdown(start, end, 0.1, 1.0)
+    assert of_planes and of_none
 
 
 def test_far_meshes_are_not_near_and_the_distance_may_change():
