@@ -425,7 +425,7 @@ class Scene:
         rows = arguments.index_rows("vf", vf, 2), arguments.index_rows("ee", ee, 4), arguments.index_rows("ef", ef, 3)
         self._repeat("ignore_features", tuple(array.copy() for array in rows))
 
-    # Not from the layout, which a scene that grows between filters would make anew for each.
+    # Not from the layout: filters that are added between meshes would each make another one.
     def _n_vertices_of(self, number: int) -> int:
         last = number + 1 == len(self._ids)
         return (self.n_vertices if last else self._core.first_vertex(number + 1)) - self._core.first_vertex(number)
