@@ -115,12 +115,14 @@ class DetailedCore:
         self, mesh: DetailedMesh, level: Level, ratio: float, ends: tuple[NDArray[Any], ...], most: float
     ) -> Doubles:
         """(C,) The deviation of each coarse face over the step. Above `most` it may be incomplete."""
-        if mesh.static and mesh.at_rest is not None:
+        # Unequal ends of a static mesh are measured, which finds coordinates that are not allowed.
+        still = mesh.static and all(np.array_equal(end[mesh.slice], ends[0][mesh.slice]) for end in ends)
+        if still and mesh.at_rest is not None:
             last, of_ratio, found = mesh.at_rest
             if of_ratio == ratio and np.array_equal(last, ends[0][mesh.slice]):
                 return found
         worst: Doubles = np.zeros(len(level.faces))
-        for end in ends[:1] if mesh.static else ends:
+        for end in ends[:1] if still else ends:
             kept_end, kept = self._ends.get((mesh.number, ratio), (None, worst))
             if kept_end is None or kept_end is not end:
                 kept = self._of_end(mesh, level, end, most)
@@ -130,7 +132,7 @@ class DetailedCore:
             worst = np.maximum(worst, kept)
             if len(worst) and worst.max() > most:
                 return worst
-        if mesh.static:
+        if still:
             mesh.at_rest = ends[0][mesh.slice].copy(), ratio, worst
         return worst
 

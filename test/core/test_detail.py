@@ -545,3 +545,21 @@ def test_coarse_borders_lie_on_those_of_the_mesh():
     found = detector.detect(flat := np.concatenate([vertices, probe]), flat)
     assert len(found.bounds) and found.bounds.max() < 1e-3 / 20  # of an edge
     assert len(detector.faces) < 0.4 * len(faces)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e160])
+def test_each_vertex_of_a_static_mesh_is_checked_at_both_ends(bad):
+    vertices, faces = hc.shapes.grid(4, 5)
+    scene = hc.Scene()
+    scene.add_mesh("still", faces, static=True, self_collision=False)
+    scene.add_mesh("moving", faces, self_collision=False)
+    start = np.concatenate([vertices, vertices + 3])
+    detector = hc.Detector(scene, detail={"still": 0.3})
+    detector.detect(start, start)
+    for vertex in range(len(vertices)):
+        end = start.copy()
+        end[vertex, 1] = bad
+        for query in (detector.detect, detector.collision_free_step):
+            with pytest.raises(ValueError, match="vertices_t1|static"):
+                query(start, end)
+    assert detector.detect(start, start) == hc.Detector(scene, detail={"still": 0.3}).detect(start, start)
