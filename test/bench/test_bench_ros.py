@@ -81,6 +81,7 @@ def test_stop_rises_and_each_end_is_heard(tmp_path):
     assert "of a frame" in said
 
 
+@pytest.mark.long
 def test_a_missed_stop_fails(tmp_path):
     status, result, said = bench(tmp_path, *STOP, "--trials", "1", "--ends", "0", change=ALL_NEAR)
     assert status == 1 and "near steps" in result["failures"][0], said
@@ -100,6 +101,7 @@ def test_soak_of_twenty_seconds(tmp_path):
     assert 20 < last["node_memory_mb"]["least"] <= last["node_memory_mb"]["most"] < 1000
 
 
+@pytest.mark.long
 def test_a_robot_beside_a_cloth(tmp_path):
     options = ("--frames", "61", "--rate", "10", "--repeat", "1", "--threads", "1", "--distances")
     status, result, said = bench(tmp_path, "robot", *options)

@@ -91,7 +91,9 @@ def test_a_bad_argument_leaves_the_earlier_file(hpccd, folder, case):
     assert _content(folder) == before
 
 
-@pytest.mark.parametrize("case", REPLACED)
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=pytest.mark.long) if case == "pdf" else case for case in REPLACED]
+)
 def test_a_full_disk_leaves_the_earlier_file(folder, case):
     arguments, name, _ = REPLACED[case]
     before = _earlier(folder, name)

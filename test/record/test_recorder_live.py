@@ -43,7 +43,7 @@ def _verified(path):
     return steps
 
 
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("stop", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_recorded_live_read_by_others_and_verified(live, namespace, tmp_path, stop):
     path = tmp_path / "run.mcap"
     known = f"{namespace}/contacts=hpccd/msg/ContactArray"

@@ -23,7 +23,7 @@ N_CRAFTED = len(hostile.KINDS)
         ("random", 40, 1),
         pytest.param("random", 130, 1, marks=pytest.mark.long),
         ("crafted", N_CRAFTED, 1),
-        ("crafted", N_CRAFTED, 1 + N_CRAFTED),
+        pytest.param("crafted", N_CRAFTED, 1 + N_CRAFTED, marks=pytest.mark.long),
     ],
 )
 def test_whatever_a_recording_holds_it_ends_with_a_status_and_a_sentence(family, number, seed, sound_bags):

@@ -157,7 +157,9 @@ def test_late_listener_still_gets_the_topology(listen, children):
     assert children[0].wait(PATIENCE) == 0
 
 
-@pytest.mark.parametrize(("name", "size"), [("folding-strip", 0.25), ("breaking-like", 1 / 64)])
+@pytest.mark.parametrize(
+    ("name", "size"), [pytest.param("folding-strip", 0.25, marks=pytest.mark.long), ("breaking-like", 1 / 64)]
+)
 def test_node_reports_the_contacts_of_a_scene(name, size, listen, children, tmp_path):
     """Parameter file, publisher and node as a user would start them; contacts equal those of the core.
 
