@@ -126,7 +126,7 @@ def check_rigid(rows):
             assert 0 < row["low"] <= row["median"] <= row["largest"] <= 1
 
 
-@pytest.mark.parametrize("name", SUBJECTS)
+@pytest.mark.parametrize("name", [pytest.param(s, marks=pytest.mark.long) if s == "rigid" else s for s in SUBJECTS])
 def test_subject(bench, name):
     status, result, _ = bench(name, *SUBJECTS[name])
     assert status == 0 and result["failures"] == [] and result["command"].startswith(f"python -m bench {name}")
@@ -157,6 +157,7 @@ def test_worlds_whose_results_differ_fail(bench, monkeypatch):
     assert status == 1 and any("one_thread: contacts of world" in text for text in result["failures"])
 
 
+@pytest.mark.long
 def test_missed_motions_of_poses_fail(bench, monkeypatch):
     monkeypatch.setattr(rigid_results, "grown", lambda d, a, b: d)
     status, result, _ = bench("rigid", "--parts", "truth", "--queries", "400")

@@ -43,7 +43,7 @@ def n_batches(question):
         (PROXIMITY, 40, 1),
         (INTERSECTIONS, 60, 1),
         (DISTANCES, 60, 1),
-        (CONTAINMENT, 600, 1),
+        (CONTAINMENT, 300, 1),
         pytest.param(CONTAINMENT, 2000, 2, marks=pytest.mark.long),
         (STEP, 25, 2),
         (MOTION, 20, 1),
@@ -287,7 +287,7 @@ def later(found):
         (SIGNED, "signed_distances", in_other_faces),
         (TRANSLATION, "separating_translation", too_far),
         (DEPTH, "penetration", too_short),
-        (DEPTH, "penetration", too_sure),
+        pytest.param(DEPTH, "penetration", too_sure, marks=pytest.mark.long),
         (POINTS, "intersections", later),
     ],
 )

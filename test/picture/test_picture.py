@@ -408,7 +408,7 @@ def test_no_surface_that_is_seen_is_black():
         assert image[seen][:, :3].max(axis=1).min() > 0.15, elevation
 
 
-@pytest.mark.parametrize("options", [(), ("--depth",)])
+@pytest.mark.parametrize("options", [pytest.param((), marks=pytest.mark.long), ("--depth",)])
 def test_depths_of_a_recording(hpccd, small_bag, tmp_path, options):
     done = hpccd("view", small_bag, "--step", 80, "-o", "step.png", *options)
     assert done.returncode == 0, done.stderr
