@@ -276,8 +276,8 @@ def test_a_publisher_of_static_transforms_that_ends_is_no_loss_and_hides_none(st
             return values.get("cause") == "rejected" and ("mesh hand" in message or "malformed" in message)
 
         stream.node.wait_until(in_doubt, "the transform is in doubt")
-        for _ in range(3):
-            used("mount")  # newer frames leave the doubt
+        peer.statuses.clear()
+        stream.node.wait_until(in_doubt, "the doubt that newer frames leave")
         assert stream.listener.stop
 
 
