@@ -99,8 +99,9 @@ class StopStream:
 
 @contextlib.contextmanager
 def started(start_node, timeout=TIMEOUT, *, program=None, remaps=(), **parameters):
-    """With a node that `start_node` starts."""
-    given = {"meshes": list(MESHES), "stop_distance": NEAR, "stop_timeout": timeout, **parameters}
+    """With a node that `start_node` starts. It queues frames: of frames that a test publishes one after the other, a
+    busy machine would drop all but the newest."""
+    given = {"meshes": list(MESHES), "stop_distance": NEAR, "stop_timeout": timeout, "frame_queue": 100, **parameters}
     stream = StopStream(start_node(given, program=program, remaps=remaps), timeout)
     try:
         yield stream
