@@ -99,9 +99,9 @@ class StopStream:
 
 @contextlib.contextmanager
 def started(start_node, timeout=TIMEOUT, *, program=None, remaps=(), **parameters):
-    """With a node that `start_node` starts. It queues frames: of frames that a test publishes one after the other, a
-    busy machine would drop all but the newest."""
-    given = {"meshes": list(MESHES), "stop_distance": NEAR, "stop_timeout": timeout, "frame_queue": 100, **parameters}
+    """With a node that `start_node` starts. Three frames may wait: of those that a test publishes at once, a
+    detection thread that starts late would otherwise get the newest only. More of a steady stream would be too old."""
+    given = {"meshes": list(MESHES), "stop_distance": NEAR, "stop_timeout": timeout, "frame_queue": 3, **parameters}
     stream = StopStream(start_node(given, program=program, remaps=remaps), timeout)
     try:
         yield stream
