@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -177,19 +176,12 @@ class Peer:
         self.node.destroy_publisher(self._publishers.pop(topic))
 
     def topology(self, mesh: str, faces: np.ndarray, n_vertices: int, version: int = 0, **edges: np.ndarray) -> None:
-        message = mesh_messages.topology_message(faces, n_vertices, version=version, **edges)
-        # Topics are not ordered: vertices sent next must not overtake it. In one of seven runs of all tests Fast DDS
-        # did not acknowledge one within 240 s; readers acknowledge below rclpy, so the node has no part in it.
-        if not self._publish_topology(mesh, message, PATIENCE / 4):
-            warnings.warn(f"meshes/{mesh}/topology: not acknowledged; published again", stacklevel=2)
-            self.forget_publisher(f"meshes/{mesh}/topology")
-            assert self._publish_topology(mesh, message, PATIENCE)
-
-    def _publish_topology(self, mesh: str, message: MeshTopology, seconds: float) -> bool:
-        """Whether it was acknowledged in time."""
         publisher = self.publisher(MeshTopology, f"meshes/{mesh}/topology", qos.TOPOLOGY)
-        publisher.publish(message)
-        return publisher.wait_for_all_acked(Duration(seconds=seconds))
+        publisher.publish(mesh_messages.topology_message(faces, n_vertices, version=version, **edges))
+        # Topics are not ordered: vertices sent next must not overtake it.
+        if not publisher.wait_for_all_acked(Duration(seconds=PATIENCE)):
+            readers = publisher.get_subscription_count()
+            raise AssertionError(f"{publisher.topic_name}: not acknowledged by {readers} readers within {PATIENCE} s")
 
     def vertices(self, mesh: str, vertices: np.ndarray, stamp: int, **fields: Any) -> None:
         publisher = self.publisher(MeshVertices, f"meshes/{mesh}/vertices")

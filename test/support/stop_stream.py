@@ -99,8 +99,11 @@ class StopStream:
 
 @contextlib.contextmanager
 def started(start_node, timeout=TIMEOUT, *, program=None, remaps=(), **parameters):
-    """With a node that `start_node` starts. Three frames may wait: of those that a test publishes at once, a
-    detection thread that starts late would otherwise get the newest only. More of a steady stream would be too old."""
+    """A stream with a node that `start_node` starts.
+
+    Up to three frames may wait. With a shorter queue, a detection thread that starts late gets only the newest of the
+    frames that a test publishes at once; with a longer one, frames of a steady stream would be too old.
+    """
     given = {"meshes": list(MESHES), "stop_distance": NEAR, "stop_timeout": timeout, "frame_queue": 3, **parameters}
     stream = StopStream(start_node(given, program=program, remaps=remaps), timeout)
     try:
