@@ -2,6 +2,7 @@
 """Files are what rosbag2 and independent readers expect."""
 
 import sys
+import time
 
 import pytest
 import yaml
@@ -10,6 +11,7 @@ from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
 from hpccd_ros.bag import message_definitions, qos_yaml
+from hpccd_ros.bag.examine import examine
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.bag.writer import BagWriter, Topic
 
@@ -163,3 +165,24 @@ def test_files_that_came_to_be_needed_later_are_found_and_none_is_overwritten(tm
             "1": b"any",
             "2": b"any",
         }
+
+
+@pytest.mark.parametrize("compression", ["none", "zstd"])
+def test_an_open_chunk_is_closed_in_time(tmp_path, monkeypatch, compression):
+    """A killed process loses at most the messages of the last flush_interval."""
+    now = 100.0
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    path = tmp_path / "bag.mcap"
+    writer = BagWriter(path, compression=compression, flush_interval=0.2)
+    writer.add_topic(Topic("/text", STRING, []))
+    writer.write("/text", text_message("one"), 1, 1)
+    now += 0.19
+    writer.poll()
+    assert examine(path).message_count == 0
+    now += 0.02
+    writer.poll()
+    assert examine(path).message_count == 1
+    now += 0.21
+    writer.write("/text", text_message("two"), 2, 2)  # without poll
+    assert examine(path).message_count == 2
+    writer.close()

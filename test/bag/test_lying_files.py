@@ -288,3 +288,22 @@ def test_messages_far_out_of_order_do_not_fill_the_memory(bag, tmp_path, monkeyp
         pytest.raises(RecordingError, match="not in the order"),
     ):
         list(recording.messages())
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"compression": "gzip"}, "gzip"),
+        ({"uncompressed_size": 2**33, "uncompressed_crc": 0}, "a chunk of 8,589,934,592 bytes, more than"),
+        ({"uncompressed_size": 2**64 - 1, "uncompressed_crc": 0}, "bytes, more than"),
+    ],
+)
+def test_a_chunk_that_cannot_be_unpacked(sound_bags, tmp_path, change, says):
+    bag, which = Bag.read(sound_bags / "streams.mcap"), iter(range(1000))
+    bag.compression = "zstd"
+    bag.chunk = lambda chunk: dataclasses.replace(chunk, **change) if next(which) == 1 else chunk
+    path = bag.write(tmp_path / "x.mcap")
+    examined, replayed = hpccd("doctor", path), hpccd("replay", path)
+    assert not examined.traceback and not replayed.traceback
+    assert examined.status == 1 and "DAMAGED" in examined.out and says in examined.out, examined
+    assert replayed.status == 2 and says in replayed.err, replayed

@@ -3,6 +3,7 @@
 
 import argparse
 import collections
+import dataclasses
 import sys
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from oracle import rigid_results
 
 import hpccd_core as hc
-from bench import distance, inside, page, step
+from bench import distance, inside, page, rigid, step, stop
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command, measure, sources
 from hpccd_ros.bench.sources import of_scene
@@ -312,3 +313,28 @@ def test_the_page_shows_the_kept_results():
         assert kept["command"].startswith(("hpccd bench ", "python -m bench ")), path
         assert kept["rows"] and not kept["failures"], path
         assert "+changes" not in kept["machine"]["commit"], "measured on sources that are in no commit"
+
+
+def test_missed_motions_of_poses_are_failures(bench, monkeypatch):
+    wrong = rigid_results.Verdict(
+        **{field.name: 0 for field in dataclasses.fields(rigid_results.Verdict)} | {"queries": 1, "missed": 1}
+    )
+    none = np.zeros(1)
+    monkeypatch.setattr(rigid, "ask", lambda queries: rigid_results.Results(none, none, none, none, none, 0.0))
+    monkeypatch.setattr(rigid, "judge", lambda queries, results: wrong)
+    status, result, _ = bench("rigid", "--parts", "truth", "--queries", "2")
+    assert status == 1 and len(result["failures"]) == 4 and all(" 1 missed" in text for text in result["failures"])
+
+
+def test_a_near_step_without_a_rise_is_missed():
+    """Of three steps the second comes near; frames come each tenth of a second."""
+    ears, sent = object.__new__(stop.Ears), [0.0, 0.1, 0.2, 0.3]
+    for changes, missed, late, rises in (
+        ([(0.0, False)], 1, 0, 0),  # never
+        ([(0.0, False), (0.25, True)], 0, 0, 1),
+        ([(0.0, False), (0.35, True)], 0, 1, 1),
+        ([(0.0, False), (0.66, True)], 1, 0, 0),  # only by silence
+    ):
+        ears.changes = changes
+        judged = stop.judge([False, True, False], sent, ears, 0.1, 0.5)
+        assert (judged["near"], judged["missed"], judged["late"], judged["rises"]) == (1, missed, late, rises)

@@ -341,3 +341,31 @@ def test_speed_scale_in_another_namespace_is_named(place):
     place.speakers.append(Speaker(f"{place.namespace}/cell1"))
     there = f"{place.namespace}/cell1/speed_scale"
     place.until(lambda: listener.reason.endswith(f"give topic='{there}'"), "the topic that has a publisher")
+
+
+@pytest.mark.parametrize("hours", [-1, 1])
+def test_a_jump_of_the_system_time_and_back(place, hours):
+    """On simulated clocks, ``stop`` is true at once, and false again after both clocks have agreed for the time-out and
+    the ten seconds that a clock set back needs."""
+    listener, steady, jumped = place.listener(), 100.0, 0
+    now = time.time_ns()
+    listener._clocks = Clocks(lambda: steady, lambda: now + jumped)
+    listener._begun, listener._alive = now + jumped, 1
+
+    def seconds_until(condition):
+        """Simulated seconds until the condition holds. A machine with a correct clock sends ten messages a time-out."""
+        nonlocal steady, now
+        for k in range(200):
+            listener._on_message(Bool(data=False), {"source_timestamp": now, "received_timestamp": now})
+            if condition():
+                return k * TIMEOUT / 10
+            steady, now = steady + TIMEOUT / 10, now + round(TIMEOUT * 1e8)
+        raise AssertionError(listener.reason)
+
+    assert seconds_until(lambda: not listener.stop) == 0
+    jumped = hours * 3600 * 10**9
+    assert f"the system clock jumped by {3600 * hours:+.3g} s" in listener.reason
+    seconds_until(lambda: True)
+    jumped = 0
+    waited = seconds_until(lambda: not listener.stop)
+    assert TIMEOUT <= waited <= TIMEOUT + 10.2

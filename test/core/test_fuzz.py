@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 from fuzz import __main__ as command
-from fuzz import differential, questions, slowest
+from fuzz import differential, questions, slowest, solids
 from fuzz.generators import GENERATORS, VERTEX_FACE
 from fuzz.questions import (
     CONTACT,
@@ -336,3 +336,15 @@ def test_the_slowest_of_each_question_are_kept(question, tmp_path, monkeypatch):
             with monkeypatch.context() as patch:
                 patch.setattr(slowest, "truth", lambda batch: (~questions.truth(batch)[0], questions.truth(batch)[1]))
                 assert slowest._different_from_oracle(herd) == 3, "the oracle is not asked"
+
+
+def test_a_lower_bound_above_the_true_depth_is_seen(monkeypatch):
+    kind = questions.kinds_of(DEPTH)[0]
+    make = next(iter(questions.generators_of(DEPTH, kind).values()))
+    queries = make(np.random.default_rng(1), 3)
+    deep, depths = solids.true_depths(kind, queries, 1)
+    assert deep.any() and not solids.break_promises(kind, queries, "exact", "auto", depths).any()
+    ask = hc.Detector.penetration
+
+    monkeypatch.setattr(hc.Detector, "penetration", lambda *arguments: too_sure(ask(*arguments)))
+    assert (solids.break_promises(kind, queries, "exact", "auto", depths) == deep).all()

@@ -371,7 +371,7 @@ def test_a_new_topology_is_true_until_a_step_with_it(start_stream):
 
 
 def test_dead_input_is_true(start_stream):
-    stream = start_stream(SHORT)
+    stream = start_stream(SHORT, frame_queue=1)
     stream.topologies()
     with stream.steady():
         stream.expect(False)
@@ -384,7 +384,7 @@ def test_dead_input_is_true(start_stream):
 
 def test_frames_that_waited_while_the_node_was_held_up_are_old(start_stream):
     """The publisher has died in the meantime: its earlier messages are not new."""
-    stream = start_stream(SHORT)
+    stream = start_stream(SHORT, frame_queue=1)
     stream.topologies()
     with stream.steady():
         stream.expect(False)

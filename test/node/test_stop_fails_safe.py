@@ -114,7 +114,7 @@ def found_clear(stream):
 
 
 def test_a_detection_that_hangs(start_stream):
-    stream = start_stream(program=HOLDING)
+    stream = start_stream(program=HOLDING, frame_queue=1)
     with found_clear(stream):
         pass
     stream.sent = holding_node.HANGS - 1

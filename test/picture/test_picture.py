@@ -2,21 +2,25 @@
 """The pictures show what is there: the nearest surface in each pixel, contacts where they project to."""
 
 import dataclasses
+import resource
 
 import numpy as np
 import pytest
+from in_process import hpccd as in_process
 from matplotlib.image import imread
 
 import hpccd_core as hc
+from hpccd_ros.base.errors import UserError
 from hpccd_ros.detect.interpenetration import Depth
 from hpccd_ros.detect.plane_patch import FACES, OUTLINE, patch
 from hpccd_ros.detect.scene import PlaneSettings, SceneBuilder
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.frames.types import NO_EDGES, MeshSettings, Topology
-from hpccd_ros.picture import contacts, curves, panels, shading, tint
+from hpccd_ros.picture import contacts, curves, panels, shading, tint, view
 from hpccd_ros.picture.camera import Camera
 from hpccd_ros.picture.intersecting import IntersectingFaces
 from hpccd_ros.picture.of_recording import separation_fact
+from hpccd_ros.picture.page import recording_page
 from hpccd_ros.picture.raster import rasterize
 from hpccd_ros.picture.shading import beads, blur, tubes, vertex_normals
 
@@ -424,3 +428,35 @@ def test_the_line_of_facts_fits_the_picture(count):
     (line,) = (text for text in figure.texts if "vertex-face" in text.get_text())
     assert line.get_window_extent().x1 < 0.98 * figure.bbox.width
     assert (line.get_fontsize() == 11.5) == (count < 14)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".pdf"])
+def test_a_full_disk_leaves_the_earlier_picture(tmp_path, suffix):
+    path = tmp_path / f"run{suffix}"
+    path.write_bytes(b"from the run before")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    picture = picture_of([[0, 0, 0]], [0.5])
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200, before[1]))
+    try:
+        with pytest.raises(OSError, match="File too large") as raised:
+            contacts.draw(picture, path, size=(160, 120))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert raised.value.filename == str(path)
+    assert path.read_bytes() == b"from the run before" and list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(("module", "target"), [(view, ("-o", "x.png")), (recording_page, ("--html", "x.html"))])
+@pytest.mark.parametrize("options", [(), ("--depth",)])
+def test_depths_are_searched_only_where_they_are_asked_for(module, target, options, small_bag, tmp_path, monkeypatch):
+    """A search may take a second for each pair of meshes."""
+    asked = []
+
+    def made(builder, *, depth=False):
+        asked.append(depth)
+        raise UserError("enough")
+
+    monkeypatch.setattr(module, "IntersectingFaces", made)
+    monkeypatch.chdir(tmp_path)
+    done = in_process("view", small_bag, "--step", 80, *target, *options)
+    assert asked == [bool(options)], done

@@ -100,7 +100,8 @@ def test_recorded_live_read_by_others_and_verified(live, namespace, tmp_path, st
 def test_split_and_compressed(live, tmp_path):
     path = tmp_path / "run"
     # Slowly, so that results of a busy node lie in the same file as their frames.
-    _record(live, path, "--split-size", "0.04", "--compression", "zstd", publisher_options=["--rate", "8"])
+    options = ("--split-size", "0.04", "--compression", "zstd")
+    _record(live, path, *options, stop=signal.SIGTERM, publisher_options=["--rate", "8"])
     files = sorted(path.glob("*.mcap"))
     assert len(files) > 2
     with Reader(path) as reader:

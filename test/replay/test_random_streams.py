@@ -21,7 +21,7 @@ def _recorded(start_node, folder, seed, recordings, ticks):
     return found
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 2))])
+@pytest.mark.parametrize("seed", [*(pytest.param(seed, marks=pytest.mark.long) for seed in (0, 1)), 2])  # 2: robots
 def test_recordings_of_random_streams_are_verified(start_node, tmp_path, seed):
     _recorded(start_node, tmp_path, seed, recordings=2, ticks=60)
 

@@ -244,3 +244,9 @@ def test_a_robot_comes_as_its_description_and_joint_states(listen, children):
         message = deserialize_message(raw, JointState)
         assert message.header.stamp == stamp
         assert dict(zip(message.name, message.position, strict=True)) == robot.joint_positions(frame.time)
+
+
+def test_a_scene_of_one_mesh_is_tested_against_itself():
+    """Its contacts are all of the mesh with itself."""
+    parameters = messages.node_parameters(scenes.make("folding-strip", size=0.1))
+    assert parameters == {"meshes": ["strip"], "mesh.strip.static": False, "mesh.strip.self_collision": True}
