@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """One loader for all mesh files."""
 
+import contextlib
+import dataclasses
 import os
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +15,7 @@ from .. import _core
 from ..arguments import LARGEST_COORDINATE
 from . import collada, contents, obj, ply, stl
 from .errors import MeshFileError, shortened
+from .polygons import Polygons
 from .welding import joined
 
 FORMATS = (".obj", ".ply", ".stl", ".dae")
@@ -83,18 +88,54 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArra
     >>> faces.tolist()
     [[0, 1, 2], [2, 3, 0]]
     """
+    mesh = load_polygons(path)
+    return mesh.polygons.vertices, mesh.faces()
+
+
+@dataclasses.dataclass(frozen=True)
+class MeshFile:
+    """A mesh file before its polygons are split.
+
+    Parameters
+    ----------
+    path : Path
+        The file, for messages.
+    polygons : Polygons
+        Vertices and polygons as the file numbers them.
+    split : callable
+        Triangles of polygons, in the order of the file's format.
+    """
+
+    path: Path
+    polygons: Polygons
+    split: Callable[[Polygons], NDArray[np.int64]] = Polygons.triangles
+
+    def faces(self, vertices: NDArray[np.float64] | None = None) -> NDArray[np.uint32]:
+        """(F, 3) uint32: triangles. How polygons are split depends on positions; vertices: others than the file's."""
+        polygons = self.polygons if vertices is None else dataclasses.replace(self.polygons, vertices=vertices)
+        with _reading(self.path), _core.StandardArithmetic():
+            return self.split(polygons).astype(np.uint32)
+
+
+def load_polygons(path: str | os.PathLike[str]) -> MeshFile:
+    """As `load_mesh`, before polygons are split into triangles."""
     file = existing(path)
+    with _reading(file), _core.StandardArithmetic():  # Python and numpy round in the mode of the thread
+        polygons, split = _parse(file.read_bytes(), file.suffix.lower())
+    return MeshFile(file, polygons, split)
+
+
+@contextlib.contextmanager
+def _reading(file: Path) -> Iterator[None]:
+    """Turns all errors into a MeshFileError that names the file."""
     try:
-        data = file.read_bytes()
-        with _core.StandardArithmetic():  # Python and numpy round in the mode of the thread
-            vertices, faces = _parse(data, file.suffix.lower())
+        yield
     except MeshFileError as error:
         raise MeshFileError(f"{shortened(file)}: {error}") from error
     except OSError as error:
         raise MeshFileError(f"{shortened(file)}: cannot be read: {error.strerror}; give another file") from error
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # damage that no other check found
         raise MeshFileError(f"{shortened(file)}: is damaged: {shortened(error)}; export it again") from error
-    return vertices, faces.astype(np.uint32)
 
 
 def existing(path: str | os.PathLike[str]) -> Path:
@@ -122,7 +163,7 @@ def existing(path: str | os.PathLike[str]) -> Path:
 
 
 @np.errstate(invalid="ignore")  # converting a signalling NaN warns; `_check` rejects it
-def _parse(data: bytes, suffix: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _parse(data: bytes, suffix: str) -> tuple[Polygons, Callable[[Polygons], NDArray[np.int64]]]:
     # The header of a binary STL may contain anything. With bytes after the triangles, the file may be an archive.
     if not (suffix == ".stl" and stl.is_binary(data)):
         text = not (suffix == ".stl" and stl.fits(data))
@@ -133,17 +174,22 @@ def _parse(data: bytes, suffix: str) -> tuple[NDArray[np.float64], NDArray[np.in
             corners = stl.parse(data)
             _check(corners, len(corners))
             first, vertex_of = joined(corners)
-            return corners[first], vertex_of.reshape(-1, 3)
+            return _triangles(corners[first], vertex_of), Polygons.triangles
         case ".dae":
             vertices, faces = collada.parse(data)
             _check(vertices, len(faces))
-            return vertices, faces
+            return _triangles(vertices, faces), Polygons.triangles
         case ".obj":
             polygons, triangles = obj.parse(data), obj.triangles
         case _:
             polygons, triangles = ply.parse(data), ply.triangles
     _check(polygons.vertices, len(polygons.counts))
-    return polygons.vertices, triangles(polygons)
+    return polygons, triangles
+
+
+def _triangles(vertices: NDArray[np.float64], corners: NDArray[np.integer[Any]]) -> Polygons:
+    """All polygons are triangles."""
+    return Polygons(vertices, corners.reshape(-1).astype(np.int64), np.full(corners.size // 3, 3, np.int64))
 
 
 def _check(vertices: NDArray[np.float64], n_faces: int) -> None:

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One mesh file for each frame, or one for each mesh and frame."""
+
+import dataclasses
+import os
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..mesh_files.load import FORMATS, MeshFile, load_polygons
+from .numbering import arrange
+from .sequence import FrameSequence, SequenceError, SequenceMesh
+
+SUFFIXES = FORMATS
+
+
+def in_folder(folder: Path) -> list[Path]:
+    """The mesh files in a folder; reads the listing only.
+
+    Raises
+    ------
+    SequenceError
+        There are none, or several formats.
+    """
+    with os.scandir(folder) as entries:
+        names = [entry.name for entry in entries if not entry.name.startswith(".") and not entry.is_dir()]
+    by_suffix: dict[str, list[Path]] = {}
+    for name in sorted(names):
+        if (suffix := Path(name).suffix.lower()) in SUFFIXES:
+            by_suffix.setdefault(suffix, []).append(folder / name)
+    if not by_suffix:
+        raise SequenceError(f"{folder}: has no mesh files; give a folder with {', '.join(SUFFIXES)} files, or a file")
+    if len(by_suffix) > 1:
+        first, second = sorted(by_suffix)[:2]
+        raise SequenceError(
+            f"{folder}: has {first} and {second} files; give a pattern of one format, such as '{folder}/*{first}'"
+        )
+    return next(iter(by_suffix.values()))
+
+
+class MeshFolder(FrameSequence):
+    """Mesh files, each read when its frame is.
+
+    Parameters
+    ----------
+    files : list of Path
+        In any order.
+    source : str
+        What was given, for messages.
+    """
+
+    def __init__(self, files: list[Path], source: str) -> None:
+        numbered = arrange(files)
+        self._files = numbered.meshes
+        super().__init__(source, numbered.n_frames, numbered.notes, numbered.gaps)
+
+    def _read(self, index: int) -> tuple[str, tuple[SequenceMesh, ...], NDArray[np.float64]]:
+        files = [of_mesh[index if len(of_mesh) > 1 else 0] for of_mesh in self._files.values()]
+        pairs = [self._mesh(name, file, index) for name, file in zip(self._files, files, strict=True)]
+        meshes = tuple(mesh for mesh, _ in pairs)
+        last = self._opened.get("meshes", ())
+        if len(last) != len(meshes) or any(a is not b for a, b in zip(meshes, last, strict=True)):
+            self._opened["meshes"] = last = meshes
+        moving = [file.name for file, of_mesh in zip(files, self._files.values(), strict=True) if len(of_mesh) > 1]
+        return ", ".join(moving or [file.name for file in files]), last, np.concatenate([v for _, v in pairs])
+
+    def _mesh(self, name: str, path: Path, index: int) -> tuple[SequenceMesh, NDArray[np.float64]]:
+        """A mesh, the same object as in the frame before if its topology is the same, and its positions."""
+        last: tuple[Path, MeshFile, SequenceMesh] | None = self._opened.get(f"last {name}")
+        if last is not None and last[0] == path:
+            return last[2], last[1].polygons.vertices
+        file = load_polygons(path)
+        if path.suffix.lower() == ".stl":
+            file = self._joined_as_first(name, file)
+        if last is not None and _same(file, last[1]):
+            mesh = last[2]
+            polygons = last[1].polygons  # so that one copy of them stays in memory
+            file = MeshFile(path, dataclasses.replace(polygons, vertices=file.polygons.vertices), file.split)
+        else:
+            vertices = None
+            if (file.polygons.counts != 3).any():  # otherwise polygons could be split differently from frame to frame
+                first = self._first(name)
+                vertices = first.polygons.vertices if _same(file, first) else None
+            mesh = SequenceMesh(name, file.faces(vertices), len(file.polygons.vertices))
+        self._opened[f"last {name}"] = path, file, mesh
+        return mesh, file.polygons.vertices
+
+    def _first(self, name: str) -> MeshFile:
+        key = f"first {name}"
+        if key not in self._opened:
+            self._opened[key] = load_polygons(self._files[name][0])
+        first: MeshFile = self._opened[key]
+        return first
+
+    def _joined_as_first(self, name: str, file: MeshFile) -> MeshFile:
+        """STL has no numbers of vertices: corners are joined as in the first frame where they are equal here too."""
+        first = self._first(name).polygons
+        polygons = file.polygons
+        corners = polygons.vertices[polygons.corners]
+        if len(corners) != len(first.corners):
+            return file
+        vertices = np.empty_like(first.vertices)
+        vertices[first.corners] = corners
+        if (vertices[first.corners] != corners).any():
+            return file
+        return MeshFile(file.path, dataclasses.replace(first, vertices=vertices))
+
+
+def _same(a: MeshFile, b: MeshFile) -> bool:
+    """Whether the polygons are the same."""
+    p, q = a.polygons, b.polygons
+    return (
+        len(p.vertices) == len(q.vertices)
+        and np.array_equal(p.counts, q.counts)
+        and np.array_equal(p.corners, q.corners)
+    )

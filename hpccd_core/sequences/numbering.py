@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Order of files by the frame numbers in their names."""
+
+import os
+import re
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from .sequence import SequenceError
+
+_SEPARATORS = " ._-/"
+_MOST_NOTES = 10  # gaps that are listed one by one
+
+
+@dataclass(frozen=True)
+class Numbered:
+    """Files by mesh and frame.
+
+    Parameters
+    ----------
+    meshes : dict of str to list of Path
+        The files of each mesh in order of their frames; one file only if the mesh is static, or if there is one frame.
+    n_frames : int
+        The number of frames.
+    gaps : dict of int to int
+        The number of frames that are missing right before a frame.
+    notes : tuple of str
+        Sentences about gaps and static meshes.
+    """
+
+    meshes: dict[str, list[Path]]
+    n_frames: int
+    gaps: dict[int, int]
+    notes: tuple[str, ...]
+
+
+def arrange(files: list[Path]) -> Numbered:
+    """Sort files into meshes and frames. The last digits in a name are the frame number, the rest is the mesh.
+
+    Raises
+    ------
+    SequenceError
+        Two files have the same number, or meshes have different frames.
+    """
+    found: dict[tuple[str, str], dict[int, Path]] = {}
+    for file, name in zip(files, _relative(files), strict=True):
+        prefix, number, suffix = _parts(name)
+        of_mesh = found.setdefault((prefix, suffix), {})
+        if number in of_mesh:
+            raise SequenceError(
+                f"{file}: has the same frame number as {of_mesh[number]}; keep one of them or number them apart"
+            )
+        of_mesh[number] = file
+    numbers = _common_numbers(found)
+    meshes = _named(found)
+    notes = []
+    if len(numbers) > 1:
+        static = [name for name, of_mesh in meshes.items() if len(of_mesh) == 1]
+        notes += [f"{meshes[name][0].name} is one file: its mesh is the same in all frames" for name in static]
+    elif len(files) > 1:
+        notes.append(f"no two files differ in their frame number only: the {len(files)} files are meshes of one frame")
+    moving = next((of_mesh for of_mesh in meshes.values() if len(of_mesh) > 1), [])
+    gaps, of_gaps = _gaps(numbers, moving)
+    return Numbered(meshes, max(1, len(numbers)), gaps, (*notes, *of_gaps))
+
+
+def _relative(files: list[Path]) -> list[str]:
+    """Names without suffix, relative to the folder that contains all files."""
+    if len({file.parent for file in files}) == 1:
+        return [file.stem for file in files]
+    common = os.path.commonpath([file.absolute().parent for file in files])
+    return [file.absolute().relative_to(common).with_suffix("").as_posix() for file in files]
+
+
+def _parts(name: str) -> tuple[str, int, str]:
+    """(text before the last digits, their number, text after them); without digits the number is 0."""
+    match = re.fullmatch(r"(.*?)([0-9]+)([^0-9]*)", name, re.DOTALL)
+    return (match[1], int(match[2]), match[3]) if match else (name, 0, "")
+
+
+def _common_numbers(found: dict[tuple[str, str], dict[int, Path]]) -> list[int]:
+    """The sorted frame numbers of all meshes that have several; empty if none has."""
+    moving = [of_mesh for of_mesh in found.values() if len(of_mesh) > 1]
+    for other in moving[1:]:
+        if apart := sorted(moving[0].keys() ^ other.keys()):
+            first, second = (moving[0], other) if apart[0] in moving[0] else (other, moving[0])
+            number = apart[0]
+            raise SequenceError(
+                f"{first[number]}: {second[min(second)].name} and the other files of its mesh have no frame {number}; "
+                "give each mesh the same frame numbers, or check the meshes one at a time"
+            )
+    return sorted(moving[0]) if moving else []
+
+
+def _named(found: dict[tuple[str, str], dict[int, Path]]) -> dict[str, list[Path]]:
+    """Files of each mesh, sorted by the names of the meshes."""
+    names = {}
+    for (prefix, suffix), of_mesh in found.items():
+        parts = [part.strip(_SEPARATORS) for part in (prefix, suffix)]
+        only = next(iter(of_mesh.values()))
+        names[prefix, suffix] = "_".join(filter(None, parts)) or "mesh" if len(of_mesh) > 1 else only.stem
+    if len(set(names.values())) < len(names):
+        names = {(prefix, suffix): f"{prefix}#{suffix}" for prefix, suffix in names}
+    return {
+        names[key]: [found[key][number] for number in sorted(found[key])]
+        for key in sorted(names, key=lambda key: names[key])
+    }
+
+
+def _gaps(numbers: list[int], files: list[Path]) -> tuple[dict[int, int], list[str]]:
+    """Missing frames, relative to the most common difference of numbers."""
+    differences = Counter(b - a for a, b in zip(numbers, numbers[1:], strict=False))
+    if not differences:
+        return {}, []
+    step = min(differences, key=lambda difference: (-differences[difference], difference))
+    gaps, notes = {}, []
+    for k, (a, b) in enumerate(zip(numbers, numbers[1:], strict=False), 1):
+        if (missing := (b - a - 1) // step) > 0:
+            gaps[k] = missing
+            what = f"frame {a + step} is" if missing == 1 else f"frames {a + step} to {a + missing * step} are"
+            notes.append(f"{what} missing between {files[k - 1].name} and {files[k].name}")
+    if len(notes) > _MOST_NOTES:
+        rest = sum(list(gaps.values())[_MOST_NOTES:])
+        notes[_MOST_NOTES:] = [f"{rest} more frames are missing in {len(notes) - _MOST_NOTES} more gaps"]
+    if step > 1:
+        notes.insert(0, f"frame numbers increase by {step}")
+    return gaps, notes

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A sequence of frames: what all readers return."""
+
+import contextlib
+import struct
+import zipfile
+import zlib
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import LARGEST_COORDINATE
+from ..mesh_files.errors import MeshFileError, shortened
+
+
+class SequenceError(MeshFileError):
+    """A sequence cannot be used. The message names the file, the problem and the remedy."""
+
+
+@dataclass(frozen=True, eq=False)
+class SequenceMesh:
+    """One mesh of a frame.
+
+    Parameters
+    ----------
+    name : str
+        Unique within the frame.
+    faces : (F, 3) uint32
+        Triangles, as numbers of this mesh's own vertices.
+    n_vertices : int
+        The number of its vertices.
+    """
+
+    name: str
+    faces: NDArray[np.uint32]
+    n_vertices: int
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The meshes and positions of one frame.
+
+    Parameters
+    ----------
+    index : int
+        Its number in the sequence, from 0.
+    name : str
+        The file name, or the file and the frame in it.
+    meshes : tuple of SequenceMesh
+        The same object from frame to frame while names, numbers of vertices and faces stay the same.
+    vertices : (V, 3) float64
+        Positions of all meshes, one mesh after the other, in the unit of the sequence.
+    """
+
+    index: int
+    name: str
+    meshes: tuple[SequenceMesh, ...]
+    vertices: NDArray[np.float64]
+
+
+class FrameSequence(ABC):
+    """Frames in order, read when they are asked for. It can be pickled; open files stay in their process.
+
+    Parameters
+    ----------
+    source : str
+        The files, for messages.
+    n_frames : int
+        The number of frames, at least 1.
+    notes : tuple of str
+        Sentences for a report: units, transforms, gaps, number formats.
+    gaps : dict of int to int
+        The number of frames that are missing right before a frame, for frames where some are.
+
+    Raises
+    ------
+    SequenceError
+        There are no frames.
+    """
+
+    def __init__(
+        self, source: str, n_frames: int, notes: tuple[str, ...] = (), gaps: dict[int, int] | None = None
+    ) -> None:
+        if n_frames < 1:
+            raise SequenceError(f"{source}: has no frames; export it again")
+        self.source = source
+        self.n_frames = n_frames
+        self.notes = notes
+        self.gaps = gaps or {}
+        self._opened: dict[str, Any] = {}  # files and results of this process
+
+    def __len__(self) -> int:
+        return self.n_frames
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_opened": {}}
+
+    def frame(self, index: int) -> Frame:
+        """Read one frame. Forward order is the cheapest.
+
+        Parameters
+        ----------
+        index : int
+            From 0 to ``n_frames - 1``.
+
+        Returns
+        -------
+        Frame
+            Its positions are finite and not larger than 1e150.
+
+        Raises
+        ------
+        SequenceError
+            A file is missing, damaged or holds no usable mesh.
+        IndexError
+            There is no such frame.
+        """
+        if not 0 <= index < self.n_frames:
+            raise IndexError(f"index: {index} is not a frame of {self.source}; use 0 to {self.n_frames - 1}")
+        with reading(self.source):
+            name, meshes, vertices = self._read(index)
+        _check(name, meshes, vertices)
+        return Frame(index, name, meshes, vertices)
+
+    @abstractmethod
+    def _read(self, index: int) -> tuple[str, tuple[SequenceMesh, ...], NDArray[np.float64]]:
+        """(name, meshes, vertices) of a frame."""
+
+
+@contextlib.contextmanager
+def reading(source: str) -> Iterator[None]:
+    """Turns errors of the system and of parsers into SequenceError."""
+    try:
+        yield
+    except SequenceError:
+        raise
+    except MeshFileError as error:
+        raise SequenceError(str(error)) from error
+    except MemoryError as error:
+        raise SequenceError(f"{source}: does not fit into memory; give a shorter or coarser sequence") from error
+    except OSError as error:
+        where = shortened(error.filename) if error.filename else source
+        raise SequenceError(f"{where}: cannot be read: {error.strerror or error}; give another file") from error
+    except (
+        ArithmeticError,
+        EOFError,
+        LookupError,
+        TypeError,
+        ValueError,
+        struct.error,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
+        raise SequenceError(f"{source}: is damaged: {shortened(error)}; copy or export it again") from error
+
+
+def _check(name: str, meshes: tuple[SequenceMesh, ...], vertices: NDArray[np.float64]) -> None:
+    """Raises SequenceError where a coordinate is not finite or too large."""
+    # Two reductions, because they need no further array; NaN passes through both and compares false.
+    if not len(vertices):
+        raise SequenceError(f"{name}: has no vertices; export it again")
+    if -LARGEST_COORDINATE <= float(vertices.min()) and float(vertices.max()) <= LARGEST_COORDINATE:
+        return
+    finite = np.isfinite(vertices).all(axis=1)
+    limits = f"lie in [-{LARGEST_COORDINATE:g}, {LARGEST_COORDINATE:g}]" if finite.all() else "be finite"
+    bad = np.abs(vertices).max(axis=1) > LARGEST_COORDINATE if finite.all() else ~finite
+    at = int(np.flatnonzero(bad)[0])
+    vertex = at
+    for mesh in meshes:
+        if vertex < mesh.n_vertices:
+            break
+        vertex -= mesh.n_vertices
+    raise SequenceError(
+        f"{name}: vertex {vertex} of mesh {mesh.name!r} is {vertices[at].tolist()}; coordinates must {limits}"
+    )
