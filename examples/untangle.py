@@ -121,7 +121,7 @@ def layers(faces):
 
 
 def save_picture(path, name, meshes, x, first, last):
-    from hpccd_ros.picture import panels
+    from hpccd_core.picture import panels
 
     before = [vertices for vertices, *_ in meshes.values()]
     after = np.split(x, np.cumsum([len(vertices) for vertices in before])[:-1])

@@ -39,8 +39,8 @@ from cloth_solver.motion import Simulation, Stuck
 from cloth_solver.queries import InProcess
 from cloth_solver.setup import Setup
 
+from hpccd_core.progress import track
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.scenes.progress import track
 from hpccd_ros.scenes.scene import Frame, Scene
 
 

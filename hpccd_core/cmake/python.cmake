@@ -24,7 +24,7 @@ endif()
 if(DEFINED HPCCD_PYTHON_DIR)
   install(TARGETS _core DESTINATION "${HPCCD_PYTHON_DIR}/hpccd_core" COMPONENT python)
   install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/" DESTINATION "${HPCCD_PYTHON_DIR}/hpccd_core" COMPONENT python
-    FILES_MATCHING PATTERN "*.py" PATTERN "*.pyi" PATTERN "py.typed"
+    FILES_MATCHING PATTERN "*.py" PATTERN "*.pyi" PATTERN "py.typed" PATTERN "assets/*"
     PATTERN "__pycache__" EXCLUDE PATTERN "include" EXCLUDE PATTERN "src" EXCLUDE PATTERN "tests" EXCLUDE
     PATTERN "cmake" EXCLUDE)
 endif()

@@ -9,10 +9,10 @@ class MeshFileError(ValueError):
     """A mesh file cannot be used. The message names the file, the problem and the remedy."""
 
 
-def shortened(text: object) -> str:
-    """The text; only its beginning, its length and its end if it is longer than LONGEST."""
+def shortened(text: object, longest: int = LONGEST) -> str:
+    """The text; only its beginning, its length and its end if it has more than `longest` characters."""
     whole = str(text)
-    if len(whole) <= LONGEST:
+    if len(whole) <= longest:
         return whole
-    half = LONGEST // 2
+    half = longest // 2
     return f"{whole[:half]}... ({len(whole)} characters) ...{whole[-half:]}"

@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterable, Iterator
 from decimal import Decimal
 from pathlib import Path
 
+from hpccd_core.whole_file import whole_file
 from hpccd_ros.bag.copied_file import CopiedFile
 from hpccd_ros.bag.decode import make_decoder
 from hpccd_ros.bag.examine import examine
 from hpccd_ros.bag.reader import RecordedMessage, Recording, RecordingError, StoredMessage
 from hpccd_ros.base.version import package_version
-from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.middleware import transform_topics
 from hpccd_ros.middleware.message_types import (
     DESCRIPTION,

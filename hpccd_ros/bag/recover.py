@@ -5,10 +5,10 @@ from pathlib import Path
 
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
+from hpccd_core.whole_file import whole_file
 from hpccd_ros.bag.copied_file import CopiedFile
 from hpccd_ros.bag.examine import Examination, examine
 from hpccd_ros.bag.reader import RecordingError
-from hpccd_ros.base.whole_file import whole_file
 
 
 def recover(source, target, compression=None) -> Examination:

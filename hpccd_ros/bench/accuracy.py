@@ -37,8 +37,8 @@ import numpy as np
 
 from hpccd_core.detail_levels import simplifier
 from hpccd_core.options import ACCURACIES, SIMD
+from hpccd_core.whole_file import whole_file
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.bench import choice, command, measure
 from hpccd_ros.bench.report import Report, cores, show
 
@@ -214,7 +214,7 @@ def draw(rows: list[dict], path: Path) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.ticker import LogLocator, NullLocator
 
-    from hpccd_ros.picture.contacts import as_bytes
+    from hpccd_core.picture.contacts import as_bytes
 
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     down = -(-len(scenes) // 4)

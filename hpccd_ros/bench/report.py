@@ -18,9 +18,9 @@ from rich.console import Console
 from rich.table import Table
 
 import hpccd_core as hc
+from hpccd_core.whole_file import whole_file
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.version import package_version
-from hpccd_ros.base.whole_file import whole_file
 
 # Head of a column -> key of a row, or a function of the row.
 Columns = dict[str, str | Callable[[dict], object]]

@@ -34,9 +34,9 @@ def run(args) -> int:
     target = Path(args.output)
     if target.suffix != ".mcap":
         raise UserError(f"-o {args.output}: must end in .mcap; give NAME.mcap")
+    from hpccd_core.progress import track
     from hpccd_ros.bag.cut import Time, cut, seconds
     from hpccd_ros.bag.reader import Recording
-    from hpccd_ros.scenes.progress import track
 
     times = []
     for option, text in (("--from", args.begin), ("--to", args.end)):

@@ -12,12 +12,12 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
+from hpccd_core.whole_file import whole_file
 from hpccd_ros import scenes
 from hpccd_ros.bag.examine import examine
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.bag.writer import free_path
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.demo.children import Children
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay

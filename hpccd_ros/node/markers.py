@@ -11,7 +11,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hpccd_ros.detect.interpenetration import Depth
+from hpccd_core.picture.lines import Depth
 from hpccd_ros.detect.plane_patch import FACES as PATCH_FACES
 from hpccd_ros.detect.plane_patch import patch
 from hpccd_ros.detect.scene import PlaneSettings

@@ -13,8 +13,9 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 import hpccd_core as hc
+from hpccd_core.picture.lines import polylines
 from hpccd_ros.detect.core import Cancellation
-from hpccd_ros.detect.interpenetration import InterpenetrationDetector, polylines
+from hpccd_ros.detect.interpenetration import InterpenetrationDetector
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.step_detector import Detection
 from hpccd_ros.middleware import qos, topic_names

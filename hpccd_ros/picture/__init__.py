@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of meshes with their contacts, rendered on the CPU into a file: no display, no graphics driver."""
+"""Pictures, pages and Rerun files of recordings and scenes."""

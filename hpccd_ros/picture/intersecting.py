@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 import hpccd_core as hc
-from hpccd_ros.detect.interpenetration import Depth, InterpenetrationDetector
+from hpccd_core.picture import intersecting_faces
+from hpccd_core.picture.lines import Depth
+from hpccd_ros.detect.interpenetration import InterpenetrationDetector
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.types import Topology
 
@@ -36,18 +38,7 @@ class IntersectingFaces:
         hits = self._detector.intersections(topologies, vertices, rest)
         self.contours = hits.contours()
         self.depths = self._detector.depths(topologies, vertices, hits) if self._depth else []
-        found = hits.ef[np.asarray(hits.mesh_a) != np.asarray(hits.mesh_b)]
         firsts = np.cumsum([0, *(topology.n_vertices for topology in topologies)])
         faces = np.concatenate([t.faces.astype(np.int64) + first for t, first in zip(topologies, firsts, strict=False)])
-        marked = np.zeros(len(faces), bool)
-        marked[found[:, 2]] = True
-        crossing = np.unique(_keys(found[:, :2], firsts[-1]))
-        for a, b in ((0, 1), (1, 2), (2, 0)):
-            marked |= np.isin(_keys(faces[:, [a, b]], firsts[-1]), crossing)
+        marked = intersecting_faces.marked(hits, faces, int(firsts[-1]))
         return np.split(marked, np.cumsum([len(topology.faces) for topology in topologies])[:-1])
-
-
-def _keys(edges: np.ndarray, n_vertices: int) -> np.ndarray:
-    """(N,) one number for each edge (N,2), whichever of its ends is first."""
-    edges = edges.astype(np.int64)
-    return edges.min(axis=1) * n_vertices + edges.max(axis=1)

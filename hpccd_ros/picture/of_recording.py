@@ -8,12 +8,12 @@ import numpy as np
 
 import hpccd_core as hc
 from hpccd_core.options import FEATURES
-from hpccd_ros.detect.interpenetration import Depth
+from hpccd_core.picture import contacts as picture
+from hpccd_core.picture.lines import Depth
 from hpccd_ros.detect.plane_patch import FACES as PATCH_FACES
 from hpccd_ros.detect.plane_patch import OUTLINE, patch
 from hpccd_ros.detect.separation import Separation, Thickness
 from hpccd_ros.middleware.contact_messages import times_of
-from hpccd_ros.picture import contacts as picture
 from hpccd_ros.picture.intersecting import IntersectingFaces
 from hpccd_ros.picture.visual_geometry import NO_VISUAL, VisualGeometry
 from hpccd_ros.replay.recomputed import ReplayedStep

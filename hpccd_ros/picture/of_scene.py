@@ -27,7 +27,7 @@ def save(
 
     azimuth, elevation: degrees, where the camera stands. Each frame is framed on its own.
     """
-    from hpccd_ros.picture import panels
+    from hpccd_core.picture import panels
 
     drawn = []
     for index in indices:

@@ -4,12 +4,12 @@
 import numpy as np
 from matplotlib.colors import to_rgb
 
+from hpccd_core.picture.contacts import TOC_COLOURS, linear, mesh_colours, srgb, toc_colours
+from hpccd_core.picture.shading import RADIUS, vertex_normals
+from hpccd_core.picture.tint import Tint
 from hpccd_ros.base import extras
 from hpccd_ros.middleware.contact_messages import times_of
-from hpccd_ros.picture.contacts import TOC_COLOURS, linear, mesh_colours, srgb, toc_colours
 from hpccd_ros.picture.of_recording import meshes_in_the_middle
-from hpccd_ros.picture.shading import RADIUS, vertex_normals
-from hpccd_ros.picture.tint import Tint
 from hpccd_ros.picture.visual_geometry import NO_VISUAL, VisualGeometry
 from hpccd_ros.replay.recomputed import ReplayedStep
 

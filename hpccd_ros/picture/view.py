@@ -6,13 +6,13 @@ import os
 import sys
 from pathlib import Path
 
+from hpccd_core.whole_file import whole_file
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import counted
-from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.picture.intersecting import IntersectingFaces
 from hpccd_ros.picture.of_recording import History, draw_step
-from hpccd_ros.picture.page.recording_page import write_page
+from hpccd_ros.picture.recording_page import write_page
 from hpccd_ros.picture.rerun_recording import RerunWriter, need_rerun
 from hpccd_ros.picture.visual_geometry import VisualGeometry
 from hpccd_ros.replay import recorded_setup

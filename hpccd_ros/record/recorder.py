@@ -10,10 +10,10 @@ import rclpy
 from rclpy.exceptions import NameValidationException
 from rclpy.executors import SingleThreadedExecutor
 
+from hpccd_core.whole_file import no_folder
 from hpccd_ros.bag.writer import BagWriter
 from hpccd_ros.base.errors import UserError, require_utf8
 from hpccd_ros.base.quoting import counted, listed
-from hpccd_ros.base.whole_file import no_folder
 from hpccd_ros.middleware import environment, graph, ros_start, stop_signals, topic_names
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.params import node_parameters

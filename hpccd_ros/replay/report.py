@@ -12,10 +12,10 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from hpccd_core.options import FEATURES
+from hpccd_core.whole_file import whole_file
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import counted
-from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.frames.drops import Reason
 from hpccd_ros.params import unknown
 from hpccd_ros.replay import recorded_setup

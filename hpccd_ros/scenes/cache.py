@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hpccd_ros.base.whole_file import whole_file
+from hpccd_core.whole_file import whole_file
 from hpccd_ros.scenes import exactmath
 
 

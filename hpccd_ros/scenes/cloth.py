@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hpccd_core.progress import track
 from hpccd_ros.scenes.exactmath import random_stream, sincos
-from hpccd_ros.scenes.progress import track
 
 GRAVITY = 9.81
 

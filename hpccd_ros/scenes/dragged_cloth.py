@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hpccd_core.progress import track
 from hpccd_ros.robots import arm
 from hpccd_ros.scenes.cloth import GRAVITY, constraints, project, rub
 from hpccd_ros.scenes.exactmath import random_stream
 from hpccd_ros.scenes.gripper import LENGTH, Gripper, Hold, in_grip, push_out, under_tips
-from hpccd_ros.scenes.progress import track
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from hpccd_core.progress import track
+from hpccd_core.whole_file import whole_file
 from hpccd_ros.bag.qos_yaml import INFINITE
 from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.base.version import package_version
-from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.scenes import messages
-from hpccd_ros.scenes.progress import track
 from hpccd_ros.scenes.scene import Scene
 
 # Frame 0 of a file is stamped with this second, so that the same scene makes the same bytes at any time.

@@ -15,13 +15,13 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
+from hpccd_core.progress import track
 from hpccd_ros.middleware import environment, qos, stop_signals, topic_names
 from hpccd_ros.middleware.fields import stamp_to_ns
 from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.scenes import messages
 from hpccd_ros.scenes.messages import Player
-from hpccd_ros.scenes.progress import track
 from hpccd_ros.scenes.scene import Scene
 
 # Seconds between the arrival of the static meshes and the first frame.

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hpccd_core.progress import track
 from hpccd_ros.scenes.exactmath import cross, dot, length, rotate
-from hpccd_ros.scenes.progress import track
 
 GRAVITY = 9.81
 

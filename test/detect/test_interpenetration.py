@@ -8,8 +8,9 @@ import pytest
 
 import hpccd_core as hc
 from hpccd_core import shapes
+from hpccd_core.picture.lines import polylines
 from hpccd_ros.detect.core import Cancellation
-from hpccd_ros.detect.interpenetration import InterpenetrationDetector, polylines
+from hpccd_ros.detect.interpenetration import InterpenetrationDetector
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.types import MeshSettings, Topology
 

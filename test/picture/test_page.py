@@ -15,14 +15,15 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from page_parts import Page
 
+from hpccd_core.picture.page import packing
+from hpccd_core.picture.page.document import document, three
+from hpccd_core.picture.page.packing import Grid, MeshPositions, packed
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.detect.interpenetration import InterpenetrationDetector
 from hpccd_ros.frames.types import Topology
-from hpccd_ros.picture.page import packing, recording_page
-from hpccd_ros.picture.page.document import document, three
-from hpccd_ros.picture.page.packing import Grid, MeshPositions, packed
-from hpccd_ros.picture.page.recording_page import RecordingPage
+from hpccd_ros.picture import recording_page
+from hpccd_ros.picture.recording_page import RecordingPage, drawing_library
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
 
@@ -263,19 +264,19 @@ def test_steps_and_places_that_are_not_there(hpccd, small_bag, tmp_path):
 def test_missing_trimesh_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)  # as if it were not installed
     with pytest.raises(UserError, match=r"needs the Python package trimesh .* extra 'page'"):
-        three()
+        drawing_library()
 
 
 def test_a_trimesh_without_the_library_is_named(monkeypatch, tmp_path):
     monkeypatch.setattr(importlib.resources, "files", lambda package: tmp_path)
     with pytest.raises(UserError, match=r"three\.js that trimesh carries: trimesh [\d.]+: .*No such file"):
-        three()
+        drawing_library()
     folder = tmp_path / "resources" / "templates"
     folder.mkdir(parents=True)
     with zipfile.ZipFile(folder / "viewer.zip", "w") as archive:
         archive.writestr("viewer.html.template", "<script>another viewer</script>")
     with pytest.raises(UserError, match=r"trimesh [\d.]+ has none"):
-        three()
+        drawing_library()
 
 
 @given(

@@ -10,7 +10,7 @@ from bag_tools import rewrite
 from page_parts import Page
 from test_page import HOSTILE, page_of
 
-from hpccd_ros.picture.contacts import BACKGROUND, TOC_COLOURS
+from hpccd_core.picture.contacts import BACKGROUND, TOC_COLOURS
 
 pytestmark = pytest.mark.skipif(
     chromium.program() is None,

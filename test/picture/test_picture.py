@@ -10,19 +10,19 @@ from in_process import hpccd as in_process
 from matplotlib.image import imread
 
 import hpccd_core as hc
+from hpccd_core.picture import contacts, curves, panels, shading, tint
+from hpccd_core.picture.camera import Camera
+from hpccd_core.picture.lines import Depth
+from hpccd_core.picture.raster import rasterize
+from hpccd_core.picture.shading import beads, blur, tubes, vertex_normals
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.detect.interpenetration import Depth
 from hpccd_ros.detect.plane_patch import FACES, OUTLINE, patch
 from hpccd_ros.detect.scene import PlaneSettings, SceneBuilder
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.frames.types import NO_EDGES, MeshSettings, Topology
-from hpccd_ros.picture import contacts, curves, panels, shading, tint, view
-from hpccd_ros.picture.camera import Camera
+from hpccd_ros.picture import recording_page, view
 from hpccd_ros.picture.intersecting import IntersectingFaces
 from hpccd_ros.picture.of_recording import separation_fact
-from hpccd_ros.picture.page import recording_page
-from hpccd_ros.picture.raster import rasterize
-from hpccd_ros.picture.shading import beads, blur, tubes, vertex_normals
 
 
 def _nearest_by_hand(corners, x, y):

@@ -13,9 +13,9 @@ import numpy as np
 from cloth_solver import motion, pairs, queries, response, setup, springs
 
 from hpccd_core import shapes
+from hpccd_core.progress import track
 from hpccd_ros import scenes
 from hpccd_ros.scenes import cache
-from hpccd_ros.scenes.progress import track
 from hpccd_ros.scenes.scene import Frame, Scene
 
 # s; four moves of the solver in one, or nothing would be hit: layers at rest are its thickness apart.

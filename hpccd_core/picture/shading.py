@@ -5,8 +5,8 @@ are thin tubes, as a line has no surface to shade."""
 import numpy as np
 
 import hpccd_core as hc
-from hpccd_ros.picture.camera import LightCamera
-from hpccd_ros.picture.raster import rasterize
+from hpccd_core.picture.camera import LightCamera
+from hpccd_core.picture.raster import rasterize
 
 SHADOW_RESOLUTION = 1200
 FILL = 0.3

@@ -5,9 +5,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator
+from typing import TypeVar
+
+Item = TypeVar("Item")
 
 
-def track(items: Iterable, description: str, show: bool, total: int | None = None) -> Iterator:
+def track(items: Iterable[Item], description: str, show: bool, total: int | None = None) -> Iterator[Item]:
     """The items, with a rich progress bar on stderr if `show` and stderr is a terminal."""
     if not (show and sys.stderr.isatty()):
         yield from items

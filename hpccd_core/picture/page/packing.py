@@ -4,16 +4,13 @@
 import dataclasses
 import zlib
 from collections.abc import Sequence
+from typing import Any, Protocol
 
 import numpy as np
-from hpccd.msg import ContactArray
 from numpy.typing import NDArray
 
 import hpccd_core as hc
-from hpccd_ros.detect.interpenetration import Depth, polylines
-from hpccd_ros.detect.layout import Layout
-from hpccd_ros.frames.types import Topology
-from hpccd_ros.middleware.contact_messages import FeaturePairs, fill_pairs, times_of
+from hpccd_core.picture.lines import Depth, polylines
 
 # Level of zlib: 9 takes twice as long for 1 % less.
 LEVEL = 7
@@ -58,6 +55,15 @@ class Grid:
     def described(self) -> dict:
         """For the page."""
         return {"low": self.low.tolist(), "high": self.high.tolist(), "step": self.step}
+
+
+class Topology(Protocol):
+    """What does not move of a mesh: faces (F, 3), edges (E, 2) beside theirs, of this many vertices."""
+
+    version: int
+    n_vertices: int
+    faces: NDArray[np.integer[Any]]
+    edges: NDArray[np.integer[Any]]
 
 
 @dataclasses.dataclass
@@ -121,28 +127,30 @@ MOST = 20_000
 TIMES = 65535
 
 
+def sampled(toc: NDArray[np.float64]) -> NDArray[np.intp]:
+    """The rows that are drawn of a step, ascending: at most MOST, evenly by time."""
+    by_time = np.argsort(toc, kind="stable")
+    return np.sort(by_time if len(toc) <= MOST else by_time[np.arange(MOST) * len(toc) // MOST])
+
+
 class ContactColumns:
-    """The vertex-face contacts of each step, then the others, with meshes and features as in ContactArray."""
+    """Contacts of each step: numbers of their meshes, their features in these, times and points."""
 
     def __init__(self):
         self._meshes = [np.empty((0, 2), np.uint32)]
         self._features = [np.empty((0, 4), np.uint32)]
         self._toc, self._points = [np.empty(0)], [np.empty((0, 3))]
 
-    def add(self, contacts, layout: Layout) -> tuple[int, int]:
-        """How many vertex-face and other contacts of this step are drawn: at most MOST, evenly by time."""
-        toc = times_of(contacts)
-        by_time = np.argsort(toc, kind="stable")
-        kept = np.sort(by_time if len(toc) <= MOST else by_time[np.arange(MOST) * len(toc) // MOST])
-        pairs = FeaturePairs.of_result(contacts).keep(kept)
-        message = ContactArray()
-        fill_pairs(message, pairs, layout)
-        self._meshes.append(np.stack([message.mesh_a, message.mesh_b], axis=1).astype(np.uint32))
-        sides = [np.asarray(side, np.uint32).reshape(-1, 2) for side in (message.features_a, message.features_b)]
-        self._features.append(np.concatenate(sides, axis=1))
-        self._toc.append(toc[kept])
-        self._points.append(np.asarray(contacts.points).reshape(-1, 3)[kept])
-        return len(pairs.vf), len(pairs) - len(pairs.vf)
+    def add(self, meshes, features, toc, points) -> None:
+        """N contacts of the next step, vertex-face first.
+
+        meshes: (N, 2). features: (N, 4), two numbers of each side, the second one NO_INDEX for vertices and faces. toc:
+        (N,). points: (N, 3).
+        """
+        self._meshes.append(np.asarray(meshes, np.uint32))
+        self._features.append(np.asarray(features, np.uint32))
+        self._toc.append(toc)
+        self._points.append(np.asarray(points, np.float64))
 
     def described(self) -> tuple[dict, dict[str, bytes]]:
         """(what the page says of them, {column: bytes})."""

@@ -13,11 +13,12 @@ import re
 import string
 import zipfile
 
-from hpccd_ros.base import extras
-from hpccd_ros.base.errors import UserError
-
 _BUILD = re.compile(r"/\*\*\n \* @license\n \* Copyright [^\n]*Three\.js Authors\n( \*[^\n]*\n)+!function[^\n]+")
 _REVISION = re.compile(r'"use strict";const \w+="(\d+)"')
+
+
+class LibraryError(Exception):
+    """There is no three.js to put into a page. The message names the remedy."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,19 +31,21 @@ class Library:
 
 
 def three() -> Library:
-    """Raises UserError where trimesh is missing, or holds no such build."""
-    extras.require("trimesh", "page", "an HTML page")
-    source = f"trimesh {importlib.metadata.version('trimesh')}"
+    """Raises LibraryError where trimesh is missing, or holds no such build."""
+    try:
+        source = f"trimesh {importlib.metadata.version('trimesh')}"
+    except importlib.metadata.PackageNotFoundError:
+        raise LibraryError("an HTML page needs the Python package trimesh; pip install trimesh") from None
     archive = importlib.resources.files("trimesh") / "resources" / "templates" / "viewer.zip"
     try:
         with zipfile.ZipFile(io.BytesIO(archive.read_bytes())) as files:
             text = "".join(files.read(name).decode() for name in files.namelist())
     except (OSError, zipfile.BadZipFile) as error:
-        raise UserError(f"an HTML page needs the three.js that trimesh carries: {source}: {error}") from error
+        raise LibraryError(f"an HTML page needs the three.js that trimesh carries: {source}: {error}") from error
     build = _BUILD.search(text)
     revision = build and _REVISION.search(build[0])
     if build is None or revision is None:
-        raise UserError(f"an HTML page needs the three.js that trimesh carries: {source} has none, 5.2.0 has it")
+        raise LibraryError(f"an HTML page needs the three.js that trimesh carries: {source} has none, 5.2.0 has it")
     return Library(build[0], revision[1], source)
 
 
@@ -86,4 +89,4 @@ def _hash(script: str) -> str:
 
 
 def _asset(name: str) -> str:
-    return (importlib.resources.files("hpccd_ros.picture.page") / "assets" / name).read_text(encoding="utf-8")
+    return (importlib.resources.files("hpccd_core.picture.page") / "assets" / name).read_text(encoding="utf-8")

@@ -6,32 +6,32 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
+from hpccd.msg import ContactArray
 
+from hpccd_core.picture.contacts import mesh_colours, mesh_groups
+from hpccd_core.picture.page.description import described
+from hpccd_core.picture.page.document import Library, LibraryError, document, three
+from hpccd_core.picture.page.packing import MOST, ContactColumns, Curves, FaceLists, MeshPositions, sampled
+from hpccd_core.progress import track
+from hpccd_core.whole_file import whole_file
 from hpccd_ros.bag.reader import Recording
+from hpccd_ros.base import extras
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import shortened
-from hpccd_ros.base.whole_file import whole_file
 from hpccd_ros.detect.plane_patch import FACES as PATCH_FACES
 from hpccd_ros.detect.plane_patch import OUTLINE, patch
 from hpccd_ros.frames.types import Topology
-from hpccd_ros.picture import curves
-from hpccd_ros.picture.contacts import BACKGROUND, FAINT, INK, INTERSECTING, TOC_COLOURS, mesh_colours, mesh_groups
+from hpccd_ros.middleware.contact_messages import FeaturePairs, fill_pairs, times_of
 from hpccd_ros.picture.intersecting import IntersectingFaces
 from hpccd_ros.picture.of_recording import facts
-from hpccd_ros.picture.page.document import document, three
-from hpccd_ros.picture.page.packing import MOST, ContactColumns, Curves, FaceLists, MeshPositions
-from hpccd_ros.picture.tint import RADIUS, STRENGTH
 from hpccd_ros.picture.visual_geometry import NO_VISUAL, VisualGeometry
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay, ReplayedStep
-from hpccd_ros.scenes.progress import track
 
 # Bytes of positions that a browser is asked to hold.
 MOST_POSITIONS = 1 << 29
 # Why there may be nothing of a step.
 GAP = "(dropped, not recorded, or started with another topology)"
-# Colours of times of contact between which the page blends.
-TOC_SHADES = 33
 
 _PATCH = Topology(0, 4, PATCH_FACES, OUTLINE)
 
@@ -89,7 +89,7 @@ class RecordingPage:
         if self._intersecting is not None and step.end_frame is not None:
             marked = self._intersecting.of(step.end_frame.topologies, step.end_frame.vertices, step.rest)
             contours, depths = self._drawn(self._intersecting.contours), self._drawn(self._intersecting.depths)
-        drawn = (0, 0) if step.contacts is None else self._contacts.add(step.contacts, step.layout)
+        drawn = (0, 0) if step.contacts is None else self._add_contacts(step.contacts, step.layout)
         self._steps.append(
             {
                 "step": str(step.step),  # a publisher may count to 2**64, more than a number of the page holds
@@ -107,6 +107,19 @@ class RecordingPage:
                 "place": len(self._numbers) - 1,
             }
         )
+
+    def _add_contacts(self, contacts, layout) -> tuple[int, int]:
+        """How many vertex-face and other contacts are drawn. Their features have the numbers of ContactArray."""
+        toc = times_of(contacts)
+        kept = sampled(toc)
+        pairs = FeaturePairs.of_result(contacts).keep(kept)
+        message = ContactArray()
+        fill_pairs(message, pairs, layout)
+        sides = [np.asarray(side, np.uint32).reshape(-1, 2) for side in (message.features_a, message.features_b)]
+        meshes = np.stack([message.mesh_a, message.mesh_b], axis=1)
+        points = np.asarray(contacts.points).reshape(-1, 3)[kept]
+        self._contacts.add(meshes, np.concatenate(sides, axis=1), toc[kept], points)
+        return len(pairs.vf), len(pairs) - len(pairs.vf)
 
     def _drawn(self, found):
         """Those between meshes that are drawn as they are tested, not by visual geometry."""
@@ -173,47 +186,22 @@ class RecordingPage:
 
     def described(self) -> tuple[dict, dict[str, bytes]]:
         """(what the page says, as JSON can hold it, {name: bytes} of what it draws)."""
-        meshes, blobs = [], {}
         drawn = [*self._meshes, *self._seen.values()]
         names = [mesh.name for mesh in drawn]
         colours, groups = mesh_colours(names), mesh_groups(names)
+        meshes = []
         for number, mesh in enumerate(drawn):
-            description, of_mesh = mesh.described()
-            colour, group = colours[number], groups[number]
+            group = groups[number]
             collision = number < len(self._meshes)
             if mesh.name in self._seen:
                 group += ": collision geometry" if collision else ""
-            hidden = collision and mesh.name in self._seen
-            of_scene = {"plane": number in self._planes, "thickness": self._thickness.get(mesh.name, 0.0)}
-            meshes.append({**description, "colour": colour, "group": group, "hidden": hidden, **of_scene})
-            blobs |= {f"mesh-{number}-{name}": data for name, data in of_mesh.items()}
+            looks = {"colour": colours[number], "group": group, "hidden": collision and mesh.name in self._seen}
+            looks |= {"plane": number in self._planes, "thickness": self._thickness.get(mesh.name, 0.0)}
+            meshes.append((mesh, looks))
         gaps = _gaps(self._numbers)
-        contacts, columns = self._contacts.described()
-        blobs |= {f"contacts-{name}": data for name, data in columns.items()}
-        blobs["intersecting-faces"] = self._marked.packed()
-        drawn_curves, columns = self._curves.described()
-        blobs |= {f"curves-{name}": data for name, data in columns.items()}
-        description = {
-            "title": shortened(self._title),
-            "view": self._view,
-            "colours": {
-                "background": BACKGROUND,
-                "ink": INK,
-                "faint": FAINT,
-                "tint": STRENGTH,
-                "radius": RADIUS,
-                "intersecting": INTERSECTING,
-                "curves": curves.COLOUR,
-                "depth": curves.DEPTH,
-                "toc": [[float(c) for c in TOC_COLOURS(t)[:3]] for t in np.linspace(0.0, 1.0, TOC_SHADES)],
-            },
-            "meshes": meshes,
-            "contacts": contacts,
-            "curves": drawn_curves,
-            "steps": [self._with_gap(step, gaps) for step in self._steps],
-            "notes": self._notes(sum(gaps)),
-        }
-        return description, blobs
+        steps = [self._with_gap(step, gaps) for step in self._steps]
+        drawn_of_steps = (self._contacts, self._marked, self._curves)
+        return described(self._title, self._view, meshes, *drawn_of_steps, steps, self._notes(sum(gaps)))
 
     def _with_gap(self, step, gaps):
         missing = gaps[step["place"]]
@@ -259,13 +247,22 @@ def _ordinal(number: int) -> str:
     return f"{number}{ending}"
 
 
+def drawing_library() -> Library:
+    """three.js. Raises UserError where trimesh, which carries it, is missing or has none."""
+    extras.require("trimesh", "page", "an HTML page")
+    try:
+        return three()
+    except LibraryError as error:
+        raise UserError(str(error)) from error
+
+
 # Bytes of a file that a browser takes long to open.
 LARGE = 50_000_000
 
 
 def write_page(args, source: Path, target: Path, title: str, view: dict) -> int:
     """As the options of `hpccd view` say. view: azimuth, elevation."""
-    library = three()  # before anything is computed
+    library = drawing_library()  # before anything is computed
     every = args.every or 1
     try:
         with whole_file(target, overwrite=True) as draft:

@@ -2,6 +2,7 @@
 """The curves along which meshes intersect, and arrows of how deep."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,8 +11,8 @@ from matplotlib.patches import FancyArrowPatch
 from matplotlib.patheffects import withStroke
 
 import hpccd_core as hc
-from hpccd_ros.detect.interpenetration import Depth
-from hpccd_ros.picture.camera import Camera
+from hpccd_core.picture.camera import Camera
+from hpccd_core.picture.lines import Depth
 
 COLOUR = "#ff5f45"
 DEPTH = "#ffffff"
@@ -45,7 +46,13 @@ def draw_depths(axes: Axes, depths: Sequence[Depth], camera: Camera, scale: floa
     outline = [withStroke(linewidth=4.0, foreground="#10141c")]
     for depth in depths:
         start, end = camera.project(np.stack([depth.start, depth.end]))[:, :2] / scale
-        style = {"arrowstyle": "-|>", "mutation_scale": 13, "shrinkA": 0, "shrinkB": 0, "linewidth": 1.8}
+        style: dict[str, Any] = {
+            "arrowstyle": "-|>",
+            "mutation_scale": 13,
+            "shrinkA": 0,
+            "shrinkB": 0,
+            "linewidth": 1.8,
+        }
         axes.add_patch(FancyArrowPatch(start, end, color=DEPTH, path_effects=outline, zorder=4, **style))
         if len(depths) <= MOST_LENGTHS:
             text = axes.annotate(f"{unit * depth.length:.3g}", end, (7, 5), textcoords="offset points", zorder=5)

@@ -5,6 +5,7 @@ import dataclasses
 import io
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -13,14 +14,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 import hpccd_core as hc
-from hpccd_ros.base.quoting import shortened
-from hpccd_ros.base.whole_file import whole_file
-from hpccd_ros.detect.interpenetration import Depth
-from hpccd_ros.picture import curves
-from hpccd_ros.picture.camera import Camera
-from hpccd_ros.picture.raster import rasterize
-from hpccd_ros.picture.shading import RADIUS, beads, shade, tubes
-from hpccd_ros.picture.tint import Tint
+from hpccd_core.mesh_files.errors import shortened
+from hpccd_core.picture import curves
+from hpccd_core.picture.camera import Camera
+from hpccd_core.picture.lines import Depth
+from hpccd_core.picture.raster import rasterize
+from hpccd_core.picture.shading import RADIUS, beads, shade, tubes
+from hpccd_core.picture.tint import Tint
+from hpccd_core.whole_file import whole_file
 
 BACKGROUND = "#10141c"
 INK = "#e8ecf4"
@@ -107,7 +108,7 @@ def _of_drawable_size(picture: Picture) -> Picture:
     if largest == 0.0 or 1e-6 < largest < 1e6:
         return picture
     exponent = -int(np.frexp(largest)[1])  # of two: no digit changes
-    meshes = [(name, np.ldexp(np.asarray(v, np.float64), exponent), *of) for name, v, *of in picture.meshes]
+    meshes: list[Any] = [(name, np.ldexp(np.asarray(v, np.float64), exponent), *of) for name, v, *of in picture.meshes]
     contours = [dataclasses.replace(c, points=np.ldexp(c.points, exponent)) for c in picture.contours]
     depths = [
         dataclasses.replace(d, start=np.ldexp(d.start, exponent), translation=np.ldexp(d.translation, exponent))

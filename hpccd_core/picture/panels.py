@@ -12,10 +12,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import hpccd_core as hc
-from hpccd_ros.base.whole_file import whole_file
-from hpccd_ros.detect.interpenetration import Depth
-from hpccd_ros.picture import curves
-from hpccd_ros.picture.contacts import BACKGROUND, INK, INTERSECTING, SUPERSAMPLING, as_bytes, render
+from hpccd_core.picture import curves
+from hpccd_core.picture.contacts import BACKGROUND, INK, INTERSECTING, SUPERSAMPLING, as_bytes, render
+from hpccd_core.picture.lines import Depth
+from hpccd_core.whole_file import whole_file
 
 
 @dataclasses.dataclass

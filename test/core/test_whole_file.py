@@ -8,8 +8,8 @@ import threading
 
 import pytest
 
-from hpccd_ros.base import whole_file as module
-from hpccd_ros.base.whole_file import whole_file
+from hpccd_core import whole_file as module
+from hpccd_core.whole_file import whole_file
 
 
 def _names(folder):
