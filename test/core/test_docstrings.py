@@ -18,7 +18,11 @@ PUBLIC = {name: getattr(hc, name) for name in hc.__all__ if not name.startswith(
 PUBLIC |= {name: getattr(rigid, name) for name in rigid.__all__ if inspect.isfunction(getattr(rigid, name))}
 
 
-EXTRAS = {"hpccd_core.torch": "torch", "hpccd_core.jax": "jax"}  # modules, and the package that each needs
+EXTRAS = {
+    "hpccd_core.torch": "torch",
+    "hpccd_core.jax": "jax",
+    "hpccd_core.warp": "newton",
+}  # modules, and the package that each needs
 
 
 @pytest.mark.parametrize("name", MODULES)
