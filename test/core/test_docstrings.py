@@ -21,6 +21,7 @@ PUBLIC |= {name: getattr(rigid, name) for name in rigid.__all__ if inspect.isfun
 EXTRAS = {
     "hpccd_core.torch": "torch",
     "hpccd_core.jax": "jax",
+    "hpccd_core.mujoco": "mujoco",
     "hpccd_core.warp": "newton",
 }  # modules, and the package that each needs
 
