@@ -7,9 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..mesh_files.errors import shortened
+from . import gltf, usd
+from .arrays import ArrayFile
 from .mesh_folder import SUFFIXES, MeshFolder, in_folder
+from .point_caches import PointCache
 from .sequence import FrameSequence, SequenceError, reading
 
+# Formats that hold all frames in one file.
+WHOLE = (".npz", ".npy", ".pc2", ".mdd", *usd.SUFFIXES, *gltf.SUFFIXES)
 PathLike = str | os.PathLike[str]
 
 
@@ -62,7 +67,28 @@ def open_sequence(
     names = [os.fspath(path) for path in given]
     source = shortened(names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more")
     with reading(source):
-        return MeshFolder(_files(names), source)
+        return _opened(names, source, None if faces is None else Path(faces).expanduser())
+
+
+def _opened(names: list[str], source: str, faces: Path | None) -> FrameSequence:
+    files = _files(names)
+    suffixes = {file.suffix.lower() for file in files}
+    if suffixes <= set(SUFFIXES):
+        if faces is not None:
+            raise SequenceError(f"{source}: has faces of its own; leave out faces (--faces)")
+        return MeshFolder(files, source)
+    if len(files) > 1:
+        whole = next(file for file in files if file.suffix.lower() not in SUFFIXES)
+        raise SequenceError(f"{shortened(whole)}: is a whole sequence; give it alone")
+    suffix = suffixes.pop()
+    match suffix:
+        case ".npz" | ".npy":
+            return ArrayFile(files[0], faces)
+        case ".pc2" | ".mdd":
+            return PointCache(files[0], faces)
+    if faces is not None:
+        raise SequenceError(f"{source}: has faces of its own; leave out faces (--faces)")
+    return usd.UsdStage(files[0]) if suffix in usd.SUFFIXES else gltf.GltfScene(files[0])
 
 
 def _files(names: list[str]) -> list[Path]:
@@ -84,6 +110,6 @@ def _files(names: list[str]) -> list[Path]:
         else:
             raise SequenceError(f"{shortened(name)}: no such file or folder (relative paths start from {Path.cwd()})")
     for file in files:
-        if file.suffix.lower() not in SUFFIXES:
-            raise SequenceError(f"{shortened(file)}: unknown format; use one of {', '.join(SUFFIXES)}")
+        if file.suffix.lower() not in (*SUFFIXES, *WHOLE):
+            raise SequenceError(f"{shortened(file)}: unknown format; use one of {', '.join((*SUFFIXES, *WHOLE))}")
     return files

@@ -2,6 +2,7 @@
 """A sequence of frames: what all readers return."""
 
 import contextlib
+import os
 import struct
 import zipfile
 import zlib
@@ -63,7 +64,7 @@ class Frame:
 
 
 class FrameSequence(ABC):
-    """Frames in order, read when they are asked for. It can be pickled; open files stay in their process.
+    """Frames in order, read when they are asked for. It can be pickled, and is used by one thread at a time.
 
     Parameters
     ----------
@@ -82,6 +83,8 @@ class FrameSequence(ABC):
         There are no frames.
     """
 
+    _of_process: tuple[int, dict[str, Any]] = (0, {})
+
     def __init__(
         self, source: str, n_frames: int, notes: tuple[str, ...] = (), gaps: dict[int, int] | None = None
     ) -> None:
@@ -91,13 +94,19 @@ class FrameSequence(ABC):
         self.n_frames = n_frames
         self.notes = notes
         self.gaps = gaps or {}
-        self._opened: dict[str, Any] = {}  # files and results of this process
 
     def __len__(self) -> int:
         return self.n_frames
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_opened": {}}
+        return {**self.__dict__, "_of_process": (0, {})}
+
+    @property
+    def _opened(self) -> dict[str, Any]:
+        """Open files and the last topology. A child process opens its own: it would share the position in a file."""
+        if self._of_process[0] != os.getpid():
+            self._of_process = os.getpid(), {}
+        return self._of_process[1]
 
     def frame(self, index: int) -> Frame:
         """Read one frame. Forward order is the cheapest.
@@ -149,6 +158,7 @@ def reading(source: str) -> Iterator[None]:
         ArithmeticError,
         EOFError,
         LookupError,
+        RuntimeError,
         TypeError,
         ValueError,
         struct.error,
