@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mesh_files.load import FORMATS, MeshFile, load_polygons
+from . import vtk
 from .numbering import arrange
 from .sequence import FrameSequence, SequenceError, SequenceMesh
 
-SUFFIXES = FORMATS
+SUFFIXES = (*FORMATS, *vtk.SUFFIXES)
 
 
 def in_folder(folder: Path) -> list[Path]:
@@ -30,7 +31,11 @@ def in_folder(folder: Path) -> list[Path]:
         if (suffix := Path(name).suffix.lower()) in SUFFIXES:
             by_suffix.setdefault(suffix, []).append(folder / name)
     if not by_suffix:
-        raise SequenceError(f"{folder}: has no mesh files; give a folder with {', '.join(SUFFIXES)} files, or a file")
+        others = f" (it has {', '.join(sorted(names)[:3])}{', ...' if len(names) > 3 else ''})" if names else ""
+        raise SequenceError(
+            f"{folder}: has no mesh files{others}; give a folder with {', '.join(SUFFIXES)} files, or one file with "
+            "all frames"
+        )
     if len(by_suffix) > 1:
         first, second = sorted(by_suffix)[:2]
         raise SequenceError(
@@ -70,7 +75,7 @@ class MeshFolder(FrameSequence):
         last: tuple[Path, MeshFile, SequenceMesh] | None = self._opened.get(f"last {name}")
         if last is not None and last[0] == path:
             return last[2], last[1].polygons.vertices
-        file = load_polygons(path)
+        file = _loaded(path)
         if path.suffix.lower() == ".stl":
             file = self._joined_as_first(name, file)
         if last is not None and _same(file, last[1]):
@@ -89,7 +94,7 @@ class MeshFolder(FrameSequence):
     def _first(self, name: str) -> MeshFile:
         key = f"first {name}"
         if key not in self._opened:
-            self._opened[key] = load_polygons(self._files[name][0])
+            self._opened[key] = _loaded(self._files[name][0])
         first: MeshFile = self._opened[key]
         return first
 
@@ -105,6 +110,10 @@ class MeshFolder(FrameSequence):
         if (vertices[first.corners] != corners).any():
             return file
         return MeshFile(file.path, dataclasses.replace(first, vertices=vertices))
+
+
+def _loaded(path: Path) -> MeshFile:
+    return vtk.load(path) if path.suffix.lower() in vtk.SUFFIXES else load_polygons(path)
 
 
 def _same(a: MeshFile, b: MeshFile) -> bool:

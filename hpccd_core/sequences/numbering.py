@@ -61,7 +61,7 @@ def arrange(files: list[Path]) -> Numbered:
     elif len(files) > 1:
         notes.append(f"no two files differ in their frame number only: the {len(files)} files are meshes of one frame")
     moving = next((of_mesh for of_mesh in meshes.values() if len(of_mesh) > 1), [])
-    gaps, of_gaps = _gaps(numbers, moving)
+    gaps, of_gaps = gaps_between(numbers, [file.name for file in moving])
     return Numbered(meshes, max(1, len(numbers)), gaps, (*notes, *of_gaps))
 
 
@@ -108,10 +108,10 @@ def _named(found: dict[tuple[str, str], dict[int, Path]]) -> dict[str, list[Path
     }
 
 
-def _gaps(numbers: list[int], files: list[Path]) -> tuple[dict[int, int], list[str]]:
-    """Missing frames, relative to the most common difference of numbers."""
+def gaps_between(numbers: list[int], names: list[str]) -> tuple[dict[int, int], list[str]]:
+    """(frames missing right before a frame, notes), relative to the most common difference of frame numbers."""
     differences = Counter(b - a for a, b in zip(numbers, numbers[1:], strict=False))
-    if not differences:
+    if not differences or min(differences) < 1:
         return {}, []
     step = min(differences, key=lambda difference: (-differences[difference], difference))
     gaps, notes = {}, []
@@ -119,7 +119,7 @@ def _gaps(numbers: list[int], files: list[Path]) -> tuple[dict[int, int], list[s
         if (missing := (b - a - 1) // step) > 0:
             gaps[k] = missing
             what = f"frame {a + step} is" if missing == 1 else f"frames {a + step} to {a + missing * step} are"
-            notes.append(f"{what} missing between {files[k - 1].name} and {files[k].name}")
+            notes.append(f"{what} missing between {names[k - 1]} and {names[k]}")
     if len(notes) > _MOST_NOTES:
         rest = sum(list(gaps.values())[_MOST_NOTES:])
         notes[_MOST_NOTES:] = [f"{rest} more frames are missing in {len(notes) - _MOST_NOTES} more gaps"]

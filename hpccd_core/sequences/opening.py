@@ -11,10 +11,12 @@ from . import gltf, usd
 from .arrays import ArrayFile
 from .mesh_folder import SUFFIXES, MeshFolder, in_folder
 from .point_caches import PointCache
+from .recording import Recording
 from .sequence import FrameSequence, SequenceError, reading
+from .splitting import SplitSequence
 
 # Formats that hold all frames in one file.
-WHOLE = (".npz", ".npy", ".pc2", ".mdd", *usd.SUFFIXES, *gltf.SUFFIXES)
+WHOLE = (".npz", ".npy", ".pc2", ".mdd", *usd.SUFFIXES, *gltf.SUFFIXES, ".mcap")
 PathLike = str | os.PathLike[str]
 
 
@@ -26,9 +28,10 @@ def open_sequence(
     Parameters
     ----------
     paths : str, os.PathLike, or a sequence of them
-        A folder of mesh files, a pattern such as ``"frames/*.obj"``, or files in any order.
+        A folder of mesh files, a pattern such as ``"frames/*.obj"``, or files in any order; or one NPZ, NPY, USD, glTF,
+        PC2, MDD or MCAP file with all frames.
     faces : str or os.PathLike, optional
-        A mesh file with the faces of a format that has none.
+        The faces of a format that has none (NPY, PC2, MDD): a mesh file, or integers (F, 3) in NPY or NPZ.
     split : bool
         Connected components of each mesh become meshes of their own.
 
@@ -67,7 +70,8 @@ def open_sequence(
     names = [os.fspath(path) for path in given]
     source = shortened(names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more")
     with reading(source):
-        return _opened(names, source, None if faces is None else Path(faces).expanduser())
+        sequence = _opened(names, source, None if faces is None else Path(faces).expanduser())
+    return SplitSequence(sequence) if split else sequence
 
 
 def _opened(names: list[str], source: str, faces: Path | None) -> FrameSequence:
@@ -88,6 +92,8 @@ def _opened(names: list[str], source: str, faces: Path | None) -> FrameSequence:
             return PointCache(files[0], faces)
     if faces is not None:
         raise SequenceError(f"{source}: has faces of its own; leave out faces (--faces)")
+    if suffix == ".mcap":
+        return Recording(files[0])
     return usd.UsdStage(files[0]) if suffix in usd.SUFFIXES else gltf.GltfScene(files[0])
 
 
