@@ -162,8 +162,8 @@ class Recording(FrameSequence):
         times = [self._meshes[name].frames[wanted[name]][0] for name in wanted if name not in found]
         for _, channel, _, message in self._reader().iter_decoded_messages(
             topics=[self._meshes[name].vertices for name in wanted if name not in found],
-            start_time=min(times, default=0),
-            end_time=max(times, default=0) + 1,
+            starting_at=min(times, default=0),
+            ending_at=max(times, default=0),
         ):
             name = names[channel.topic]
             if _stamp(message) == wanted[name]:
@@ -180,7 +180,7 @@ class Recording(FrameSequence):
                 raise SequenceError(f"{self._path}: {name} has no topology of version {version}; record it again")
             at = mesh.topologies[version]
             for _, _, _, topology in self._reader().iter_decoded_messages(
-                topics=[mesh.topology], start_time=at, end_time=at + 1
+                topics=[mesh.topology], starting_at=at, ending_at=at
             ):
                 if topology.version == version:
                     self._opened[key] = version, self._with_faces(name, topology)
