@@ -25,6 +25,7 @@ COMMANDS = {
     "replay": "compute a recording again and verify its contacts, or play it over DDS",
     "view": "draw recorded frames: shaded meshes with their contacts",
     "cut": "cut a part out of a recording that replays by itself",
+    "check": "check a sequence of frames: what intersects, and what passes through",
     "doctor": "check a recording; save what is readable of one that was cut off",
     "scene": "generate, play or draw a deforming scene",
     "bench": "measure speed and latency on this machine",

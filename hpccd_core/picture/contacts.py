@@ -59,6 +59,7 @@ class Picture:
     thickness: Mapping[str, float] = dataclasses.field(
         default_factory=dict
     )  # of meshes: radius of spheres and capsules
+    intersecting_are: str = "faces that intersect another mesh"
 
 
 @dataclasses.dataclass
@@ -256,7 +257,7 @@ def _write_title(figure, picture):
     names = [name for name, *_ in picture.meshes]
     colours = dict(zip(mesh_groups(names), mesh_colours(names), strict=True))
     if picture.intersecting is not None and picture.intersecting.any():
-        colours["faces that intersect another mesh"] = INTERSECTING
+        colours[picture.intersecting_are] = INTERSECTING
     if any(len(contour) > 1 for contour in picture.contours):
         colours["intersection curves"] = curves.COLOUR
     if picture.depths:

@@ -33,6 +33,11 @@ MOST_POSITIONS = 1 << 29
 # Why there may be nothing of a step.
 GAP = "(dropped, not recorded, or started with another topology)"
 
+ORIGIN = (
+    "Contacts were computed again from the recorded frames when this page was written; milliseconds are those of that "
+    "computation. A step whose recorded result differs has a notice."
+)
+
 _PATCH = Topology(0, 4, PATCH_FACES, OUTLINE)
 
 
@@ -201,7 +206,7 @@ class RecordingPage:
         gaps = _gaps(self._numbers)
         steps = [self._with_gap(step, gaps) for step in self._steps]
         drawn_of_steps = (self._contacts, self._marked, self._curves)
-        return described(self._title, self._view, meshes, *drawn_of_steps, steps, self._notes(sum(gaps)))
+        return described(self._title, self._view, meshes, *drawn_of_steps, steps, self._notes(sum(gaps)), ORIGIN)
 
     def _with_gap(self, step, gaps):
         missing = gaps[step["place"]]

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from hpccd_core.check import workers
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base import extras
 from hpccd_ros.base.errors import UserError
@@ -56,7 +57,7 @@ def main(args) -> int:
 def _rows(distributed, args) -> list[dict]:
     """The outcome of each recording, in the given order."""
     paths = [str(Path(path).absolute()) for path in args.files]
-    with _cluster(distributed, args, len(paths)) as (client, threads):
+    with _cluster(distributed, args.scheduler, args.jobs, len(paths)) as (client, threads):
         options = {
             "params": args.params and str(Path(args.params).absolute()),
             "backend": args.backend,
@@ -71,29 +72,13 @@ def _rows(distributed, args) -> list[dict]:
 
 
 @contextlib.contextmanager
-def _cluster(distributed, args, jobs):
-    """(client, threads of the core for each job; 0: all that the worker's machine has)."""
-    if args.scheduler:
-        try:
-            client = distributed.Client(args.scheduler, timeout="60s")
-        except (OSError, ValueError, TimeoutError) as error:
-            raise UserError(f"--scheduler {args.scheduler}: no Dask scheduler responds there: {error}") from error
-        with client:
-            workers = len(client.scheduler_info(n_workers=-1)["workers"])
-            if not workers:
-                raise UserError(f"--scheduler {args.scheduler}: a cluster without workers: start some (dask worker)")
-            yield client, 0
-        return
-    cores = len(os.sched_getaffinity(0))
-    processes = min(args.jobs or cores, jobs)
-    # On this machine only, and without the web page of Dask.
-    with (
-        distributed.LocalCluster(
-            n_workers=processes, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
-        ) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        yield client, max(1, cores // processes)
+def _cluster(*arguments):
+    """As `workers.cluster`, whose error becomes a UserError."""
+    try:
+        with workers.cluster(*arguments) as connected:
+            yield connected
+    except workers.ClusterError as error:
+        raise UserError(str(error)) from error
 
 
 def _gather(distributed, futures, paths) -> list[dict]:

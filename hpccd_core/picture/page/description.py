@@ -24,11 +24,13 @@ def described(
     lines: Curves,
     steps: list[dict],
     notes: list[str],
+    origin: str,
+    intersecting_are: str = "faces that intersect another mesh",
 ) -> tuple[dict, dict[str, bytes]]:
     """(what the page says, as JSON can hold it, {name: bytes} of what it draws).
 
     view: azimuth, elevation. meshes: with colour, group, hidden, plane and thickness of each. steps: as the viewer's
-    `recording.js` reads them.
+    `recording.js` reads them. origin: how the contacts were computed, as a sentence.
     """
     of_meshes = []
     blobs: dict[str, bytes] = {}
@@ -60,5 +62,7 @@ def described(
         "curves": of_curves,
         "steps": steps,
         "notes": notes,
+        "origin": origin,
+        "intersectingFacesAre": intersecting_are,
     }
     return description, blobs

@@ -60,10 +60,14 @@ class Grid:
 class Topology(Protocol):
     """What does not move of a mesh: faces (F, 3), edges (E, 2) beside theirs, of this many vertices."""
 
-    version: int
-    n_vertices: int
-    faces: NDArray[np.integer[Any]]
-    edges: NDArray[np.integer[Any]]
+    @property
+    def version(self) -> int: ...
+    @property
+    def n_vertices(self) -> int: ...
+    @property
+    def faces(self) -> NDArray[np.integer[Any]]: ...
+    @property
+    def edges(self) -> NDArray[np.integer[Any]]: ...
 
 
 @dataclasses.dataclass
@@ -136,7 +140,7 @@ def sampled(toc: NDArray[np.float64]) -> NDArray[np.intp]:
 class ContactColumns:
     """Contacts of each step: numbers of their meshes, their features in these, times and points."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._meshes = [np.empty((0, 2), np.uint32)]
         self._features = [np.empty((0, 4), np.uint32)]
         self._toc, self._points = [np.empty(0)], [np.empty((0, 3))]
@@ -169,7 +173,7 @@ class ContactColumns:
 class FaceLists:
     """For each step the faces of each mesh that intersect another mesh: their numbers in it, mesh after mesh."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._faces = [np.empty(0, np.uint32)]
 
     def add(self, marked: Sequence[NDArray[np.bool_]]) -> list[int]:
@@ -189,7 +193,7 @@ MOST_OF_CURVES = 4_000
 class Curves:
     """The intersection curves of each step, and then the starts and ends of its depths."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._points: list[np.ndarray] = [np.empty((0, 3))]
         self._lengths: list[int] = []
 

@@ -85,7 +85,9 @@ class Chart {
       if (number % Math.ceil(every) === 0) context.fillText(step.step, x(i + 0.5), floor + 13);
     });
     axis(context, Chart.CONTACTS, "contacts", "right", Chart.LEFT - 7, this.mostContacts, Chart.TOP, floor);
-    axis(context, Chart.MILLISECONDS, "ms", "left", width - Chart.RIGHT + 7, this.mostMilliseconds, Chart.TOP, floor);
+    if (steps.some((step) => step.milliseconds !== null)) {
+      axis(context, Chart.MILLISECONDS, "ms", "left", width - Chart.RIGHT + 7, this.mostMilliseconds, Chart.TOP, floor);
+    }
 
     context.fillStyle = colours.ink;
     context.fillRect(x(this.step + 0.5) - 0.75, Chart.TOP - 3, 1.5, tall + 3);
@@ -94,7 +96,8 @@ class Chart {
 
   describe(context, step, x, width) {
     const { step: number, total, milliseconds } = this.recording.steps[step];
-    const what = total === null ? "no contacts known" : `${total.toLocaleString("en")} contacts, ${milliseconds.toFixed(1)} ms`;
+    const what = total === null ? "no contacts known" : `${total.toLocaleString("en")} contacts`
+      + (milliseconds === null ? "" : `, ${milliseconds.toFixed(1)} ms`);
     const text = `step ${number}: ${what}`, half = context.measureText(text).width / 2;
     context.textAlign = "center";
     context.fillText(text, Math.max(Chart.LEFT + half, Math.min(width - Chart.RIGHT - half, x(step + 0.5))), 10);

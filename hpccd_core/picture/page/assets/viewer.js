@@ -143,7 +143,8 @@ class Viewer {
     }
     this.writeNotes();
     this.bindControls();
-    this.worst = recording.steps.reduce((best, step, i, all) => ((step.total ?? -1) > (all[best].total ?? -1) ? i : best), 0);
+    this.worst = recording.steps.reduce((best, step, i, all) => (worse(step, all[best]) ? i : best), 0);
+    byId("intersecting").append(recording.intersectingFacesAre);
     this.show(this.worst);
     if (this.stage) {
       this.stage.resize();
@@ -314,8 +315,7 @@ class Viewer {
       .map((mesh) => `${mesh.name}: ${short(mesh.step)}`).join(", ");
     byId("notes").replaceChildren(...[
       ...notes,
-      "Contacts were computed again from the recorded frames when this page was written; milliseconds are those of that "
-      + "computation. A step whose recorded result differs has a notice.",
+      this.recording.origin,
       `Positions are rounded to multiples of these lengths, in the unit of the scene: `
       + `${rounded}; points of contacts: ${short(contacts.step)}. Times of impact are rounded to 1/${contacts.times}.`,
       `Drawn with three.js r${library.revision}, bundled with ${library.source}. This file uses no network.`,
@@ -399,6 +399,13 @@ function sizeOf(mesh, steps) {
 }
 
 const short = (value) => String(Number(value.toPrecision(2)));
+
+// Whether a step has more contacts than another one, or as many and more faces that intersect.
+function worse(step, other) {
+  const faces = (of) => of.intersecting.reduce((sum, count) => sum + count, 0);
+  const more = (step.total ?? -1) - (other.total ?? -1);
+  return more > 0 || (more === 0 && faces(step) > faces(other));
+}
 
 function element(tag, text, name = "") {
   const made = document.createElement(tag);

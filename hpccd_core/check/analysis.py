@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Check the frames and steps of a part of a sequence."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contacts import Contacts
+from ..detector import Detector
+from ..proximity import Gap
+from ..sequences import Frame, FrameSequence, SequenceError
+from .frame_scene import FrameScene
+from .report import FrameResult, StepResult
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """What is checked.
+
+    Parameters
+    ----------
+    separation : float
+        Different meshes that are closer than this are reported, in the unit of the sequence; 0: only surfaces that
+        touch.
+    weld : bool
+        Join vertices of a mesh that are at one position in the first frame of the sequence.
+    changes : bool
+        Accept meshes that change from frame to frame. Steps across a change are not checked.
+    """
+
+    separation: float = 0.0
+    weld: bool = False
+    changes: bool = False
+
+
+@dataclasses.dataclass(frozen=True)
+class State:
+    """A frame in the scene of its meshes. Scene and detectors are those of the frame before while the meshes stay."""
+
+    frame: Frame
+    scene: FrameScene
+    x: NDArray[np.float64]
+    motion: Detector
+    distance: Detector
+
+
+class Checker:
+    """Reads frames of a sequence and answers for each frame and step.
+
+    Parameters
+    ----------
+    sequence : FrameSequence
+    options : Options
+    threads : int
+        Of the core; 0: all cores.
+    """
+
+    def __init__(self, sequence: FrameSequence, options: Options, threads: int = 0) -> None:
+        if options.weld and options.changes:
+            raise SequenceError("--weld: joins vertices as in the first frame; do not combine it with --changes")
+        self._sequence, self._options, self._threads = sequence, options, threads
+        self._last: State | None = None
+        self._first: Frame | None = None
+
+    def state(self, index: int) -> State:
+        """The frame with this number.
+
+        Raises
+        ------
+        SequenceError
+            A file cannot be used, or the meshes differ from those of the frame asked for before, without `changes`.
+        """
+        if self._last is not None and self._last.frame.index == index:
+            return self._last
+        frame, last = self._sequence.frame(index), self._last
+        if last is not None and last.frame.meshes is frame.meshes:
+            self._last = dataclasses.replace(last, frame=frame, x=last.scene.positions(frame))
+            return self._last
+        if last is not None and not self._options.changes:
+            raise SequenceError(
+                f"{frame.name}: {_change(last.frame, frame)} since {last.frame.name}, so no motion is known between "
+                "them; --changes checks each frame, and leaves out this step"
+            )
+        if self._options.weld and self._first is None:
+            self._first = frame if index == 0 else self._sequence.frame(0)
+        scene = FrameScene(frame.meshes, self._options.separation, self._first)
+        motion, distance = (
+            Detector(of, backend="cpu", threads=self._threads, outputs=("points",)) for of in (scene.scene, scene.apart)
+        )
+        self._last = State(frame, scene, scene.positions(frame), motion, distance)
+        return self._last
+
+    def frame(self, state: State) -> FrameResult:
+        """What is wrong in a frame."""
+        gaps = state.distance.distances(state.x)
+        smallest = min((gap.distance for gap in gaps), default=np.inf)
+        inside = [pair for gap in gaps for pair in _inside(gap)]
+        count = len(state.motion.intersections(state.x))
+        distance = float(smallest) if np.isfinite(smallest) else None
+        return FrameResult(state.frame.index, state.frame.name, count, distance, tuple(inside))
+
+    def step(self, start: State, end: State) -> tuple[StepResult, Contacts | None]:
+        """What touches in the step between two frames, and the contacts; None where the meshes changed."""
+        indices = start.frame.index, end.frame.index
+        if start.scene is not end.scene:
+            return StepResult(*indices, None, None), None
+        contacts = end.motion.detect(start.x, end.x)
+        return StepResult(*indices, len(contacts), float(contacts.first_toc) if len(contacts) else None), contacts
+
+
+def check_part(
+    sequence: FrameSequence, options: Options, begin: int, end: int, threads: int = 0
+) -> Iterator[tuple[FrameResult, StepResult | None]]:
+    """Check the frames ``begin`` to ``end - 1``, and the step from each of them to the next frame, if there is one.
+
+    Results do not depend on where a sequence is cut into parts.
+
+    Parameters
+    ----------
+    sequence : FrameSequence
+    options : Options
+    begin, end : int
+        Frames.
+    threads : int
+        Of the core; 0: all cores.
+
+    Yields
+    ------
+    tuple of FrameResult and StepResult
+        Of one frame; without a step for the last frame of the sequence.
+
+    Raises
+    ------
+    SequenceError
+        As :func:`hpccd_core.sequences.open_sequence`, or meshes change and `options.changes` is not set.
+    """
+    checker = Checker(sequence, options, threads)
+    for index in range(begin, end):
+        state = checker.state(index)
+        result = checker.frame(state)
+        if index + 1 == len(sequence):
+            yield result, None
+        else:
+            yield result, checker.step(state, checker.state(index + 1))[0]
+
+
+def _inside(gap: Gap) -> list[tuple[str, str]]:
+    """(inner mesh, outer mesh) of a gap."""
+    a, b = (gap.mesh_a, gap.mesh_b), (gap.mesh_b, gap.mesh_a)
+    return {"a": [a], "b": [b], "both": [a, b]}.get(gap.inside or "", [])
+
+
+def _change(before: Frame, after: Frame) -> str:
+    """How the meshes of a frame differ from those of another one, in a few words."""
+    old, new = ({mesh.name: mesh for mesh in frame.meshes} for frame in (before, after))
+    for name in [*old, *new]:
+        if name not in new:
+            return f"mesh {name!r} is missing"
+        if name not in old:
+            return f"mesh {name!r} is new"
+        if old[name].n_vertices != new[name].n_vertices:
+            return f"mesh {name!r} changed from {old[name].n_vertices:,} to {new[name].n_vertices:,} vertices"
+    return "faces changed"

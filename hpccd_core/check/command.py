@@ -1,0 +1,333 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Check a sequence of frames. In each frame: which surfaces intersect, which mesh is inside another, and the smallest
+distance. In each step to the next frame: what touches or passes through. All decisions are exact.
+
+  COMMAND frames/                      a folder of OBJ, PLY, STL, DAE, VTK or VTU files, one for each frame
+  COMMAND 'out/cloth_*.obj'            a pattern; body_0001.obj beside cloth_0001.obj is a second mesh
+  COMMAND cache.npz run.usd run.glb    arrays, USD, glTF: each file is a sequence
+  COMMAND sim.pc2 --faces rest.obj     point caches (PC2, MDD) and .npy, with their faces
+  COMMAND run.mcap --json out.json     a recording of meshes
+  COMMAND frames/ --html page.html     an interactive page with contacts and intersection curves
+  COMMAND frames/ --separation 0.002   report meshes closer than 0.002, too
+  COMMAND frames/ --cluster --jobs 4   in four processes, with Dask
+
+Contacts assume that each vertex moves in a straight line from frame to frame.
+
+exit status: 0 clean; 1 surfaces touch, intersect or pass through each other; 2 unusable input; 130 interrupted
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import difflib
+import importlib
+import io
+import os
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+from .._core import __version__
+from ..mesh_files.errors import MeshFileError, shortened
+from ..progress import counting, track
+from ..sequences import FrameSequence, open_sequence
+from ..sequences.opening import WHOLE
+from ..whole_file import whole_file
+from . import workers
+from .analysis import Options
+from .report import COLUMNS, Report, cells, write_csv, write_json
+
+# Rows of the printed table; --csv has all.
+MOST_ROWS = 40
+
+
+class CheckError(Exception):
+    """A problem and its remedy, for the user of the command."""
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument(
+        "paths",
+        metavar="PATH",
+        nargs="+",
+        help="a folder, a pattern or files of one sequence; or several sequences, each a folder or a file with all its "
+        "frames",
+    )
+    parser.add_argument("--faces", metavar="FILE", help="faces of PC2, MDD and .npy: a mesh file, .npy or .npz")
+    parser.add_argument(
+        "--separation",
+        type=float,
+        default=0.0,
+        metavar="D",
+        help="report different meshes within this distance, in the unit of the positions (default: %(default)s)",
+    )
+    parser.add_argument("--split", action="store_true", help="connected components of a mesh are meshes of their own")
+    parser.add_argument(
+        "--weld",
+        action="store_true",
+        help="join vertices of a mesh that have one position in the first frame, as at seams of exported meshes",
+    )
+    parser.add_argument(
+        "--changes",
+        action="store_true",
+        help="accept meshes that change from frame to frame; the step of a change is not checked",
+    )
+    results = parser.add_argument_group("results")
+    results.add_argument("--json", metavar="FILE", help="write verdict, frames and steps")
+    results.add_argument("--csv", metavar="FILE", help="write a table with one row for each frame")
+    results.add_argument("--html", metavar="FILE", help="write an interactive page that needs no network")
+    results.add_argument("--png", metavar="FILE", help="draw the worst frame")
+    results.add_argument(
+        "--up",
+        choices=("x", "y", "z"),
+        help="axis that points up in page and picture (default: as USD and glTF files say, otherwise z)",
+    )
+    speed = parser.add_argument_group("speed")
+    speed.add_argument(
+        "--jobs", type=int, default=0, metavar="N", help="parts checked at once; 0: one for each core (default)"
+    )
+    speed.add_argument("--cluster", action="store_true", help="check in processes, with Dask, instead of threads")
+    speed.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a Dask cluster whose workers see the files under the same names"
+    )
+
+
+def description(command: str) -> str:
+    """The help text."""
+    return (__doc__ or "").replace("COMMAND", command)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Check as the options say, write files and print the result.
+
+    Returns
+    -------
+    int
+        0: clean, 1: defects.
+
+    Raises
+    ------
+    CheckError
+        Wrong use, or unusable input.
+    """
+    if not 0.0 <= args.separation < float("inf"):
+        raise CheckError(f"--separation {args.separation}: must be a finite number, 0 or more")
+    if args.jobs < 0:
+        raise CheckError(f"--jobs {args.jobs}: must be 0 or more")
+    options = Options(args.separation, args.weld, args.changes)
+    try:
+        if options.weld and options.changes:
+            raise CheckError("--weld: joins vertices as in the first frame; leave out --changes")
+        groups = _sequences(args.paths)
+        if len(groups) > 1 and (args.html or args.png):
+            option = "--html" if args.html else "--png"
+            raise CheckError(f"{option}: shows one sequence, {len(groups)} are given; run one command for each")
+        _reject_one_file_for_two(args)
+        library = _library(args)
+        with contextlib.ExitStack() as files:
+            drafts = {name: files.enter_context(_new_file(name, getattr(args, name))) for name in FILES}
+            sequences = [open_sequence(paths, faces=args.faces, split=args.split) for paths in groups]
+            reports = _reports(sequences, options, args)
+            _write(drafts, sequences, options, reports, library, args)
+    except (MeshFileError, workers.ClusterError) as error:
+        raise CheckError(str(error)) from error
+    for report in reports:
+        _print(report, len(reports) > 1)
+    return 0 if all(report.clean for report in reports) else 1
+
+
+FILES = ("json", "csv", "html", "png")
+
+
+def _sequences(paths: list[str]) -> list[list[str]]:
+    """The paths of each sequence: mesh files and patterns belong to one, a folder or a whole file is one of its own."""
+    whole = [path for path in paths if os.path.isdir(path) or Path(path).suffix.lower() in WHOLE]
+    rest = [path for path in paths if path not in whole]
+    return [[path] for path in dict.fromkeys(whole)] + ([rest] if rest else [])
+
+
+def _reject_one_file_for_two(args: argparse.Namespace) -> None:
+    """Raises CheckError if a result would replace another one, or the input."""
+    used = {os.path.realpath(path): "input" for path in [*args.paths, *([args.faces] if args.faces else [])]}
+    for name in FILES:
+        if path := getattr(args, name):
+            if what := used.get(os.path.realpath(path)):
+                raise CheckError(f"--{name} {shortened(path)}: is the file of {what}, too; give another name")
+            used[os.path.realpath(path)] = f"--{name}"
+
+
+def _library(args: argparse.Namespace) -> Any:
+    """three.js for --html. Raises CheckError before anything is computed where a package is missing."""
+    _need("rich", "the table of results")
+    if args.cluster or args.scheduler:
+        _need("distributed", "--scheduler" if args.scheduler else "--cluster", "cluster")
+    if args.png or args.html:
+        _need("matplotlib", "--png" if args.png else "--html")
+    if not args.html:
+        return None
+    from ..picture.page.document import LibraryError, three
+
+    try:
+        return three()
+    except LibraryError as error:
+        raise CheckError(f"--html: {error}") from error
+
+
+def _need(module: str, what: str, extra: str = "check") -> Any:
+    try:
+        return importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        raise CheckError(f"{what}: needs the Python package {module}; pip install 'hpccd-core[{extra}]'") from error
+
+
+@contextlib.contextmanager
+def _new_file(option: str, path: str | None) -> Iterator[Path | None]:
+    """A place to write to, which becomes the file at the end; an existing file is replaced."""
+    if not path:
+        yield None
+        return
+    try:
+        with whole_file(path, overwrite=True) as draft:
+            yield draft
+    except OSError as error:
+        if error.filename != str(path):
+            raise
+        raise CheckError(f"--{option} {shortened(path)}: {error.strerror or error}") from error
+
+
+def _reports(sequences: list[FrameSequence], options: Options, args: argparse.Namespace) -> list[Report]:
+    with counting("frames", sum(map(len, sequences))) as progress:
+        if not (args.cluster or args.scheduler):
+            return [
+                workers.report_of(sequence, options, workers.in_threads(sequence, options, args.jobs, progress))
+                for sequence in sequences
+            ]
+        most = sum(workers.n_parts(sequence) for sequence in sequences)
+        distributed = importlib.import_module("distributed")
+        with workers.cluster(distributed, args.scheduler, args.jobs, most) as (client, threads):
+            return [
+                workers.report_of(sequence, options, workers.on_cluster(client, sequence, options, threads, progress))
+                for sequence in sequences
+            ]
+
+
+def _write(
+    drafts: dict[str, Path | None],
+    sequences: list[FrameSequence],
+    options: Options,
+    reports: list[Report],
+    library: Any,
+    args: argparse.Namespace,
+) -> None:
+    """Write the files that are asked for."""
+    for name, write in (("json", write_json), ("csv", write_csv)):
+        if draft := drafts[name]:
+            with draft.open("w", encoding="utf-8", newline="") as stream:
+                write(stream, reports)
+    if not (drafts["png"] or drafts["html"]):
+        return
+    from . import drawing
+
+    drawn = (sequences[0], options, reports[0])
+    up = args.up or getattr(sequences[0], "up", None) or "z"
+    if draft := drafts["png"]:
+        drawing.write_picture(*drawn, draft, up)
+    if draft := drafts["html"]:
+        drawing.write_page(*drawn, draft, up, library, lambda frames: track(frames, "page", True))
+
+
+def _print(report: Report, several: bool) -> None:
+    """The table of what is wrong, notes, and the verdict."""
+    from rich.console import Console
+    from rich.table import Table
+
+    rows = report.bad_rows()
+    console = Console(highlight=False)
+    if rows and console.is_terminal:
+        table = Table("frame", "file", "intersections", "distance", "inside", "contacts to next", "first at")
+        for row in rows[:MOST_ROWS]:
+            table.add_row(*_short(cells(*row, unknown="not checked")))
+        console.print(table)
+    elif rows:
+        print("\t".join(COLUMNS))
+        for row in rows[:MOST_ROWS]:
+            print("\t".join(cells(*row, unknown="not checked")))
+    if len(rows) > MOST_ROWS:
+        print(f"... {len(rows) - MOST_ROWS:,} more rows; --csv writes all")
+    for note in report.notes:
+        print(f"note: {_printable(note)}")
+    print(f"{_printable(report.source)}: " * several + _printable(report.sentence()), flush=True)
+
+
+def _short(row: list[str]) -> list[str]:
+    """Numbers with few digits."""
+    numbers = ("distance", "first_toc")
+    return [
+        f"{float(text):.4g}" if name in numbers and text else _printable(text)
+        for name, text in zip(COLUMNS, row, strict=True)
+    ]
+
+
+def _printable(text: str) -> str:
+    """For a terminal: control characters of file names are escaped."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Names the option that a misspelt one is nearest to."""
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        self._given = sys.argv[1:] if args is None else list(args)
+        return super().parse_known_args(args, namespace)
+
+    def error(self, message: str) -> NoReturn:
+        options = [option for option in self._option_string_actions if option.startswith("--")]
+        words = [word.partition("=")[0] for word in self._given if word.startswith("--")]
+        near = [difflib.get_close_matches(word, options, n=1, cutoff=0.7) for word in words if word not in options]
+        meant = "; did you mean " + ", ".join(names[0] for names in near if names) + "?" if any(near) else ""
+        super().error(message + meant)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command `hpccd-check`.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Its arguments; by default those of the process.
+
+    Returns
+    -------
+    int
+        The exit status.
+    """
+    parser = _Parser(
+        prog="hpccd-check",
+        description=description("hpccd-check"),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("-V", "--version", action="version", version=f"hpccd-check {__version__}")
+    configure(parser)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # file names need not be text of the terminal
+    args = parser.parse_args(argv)
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that incomplete files are removed
+    try:
+        return run(args)
+    except CheckError as error:
+        print(f"hpccd-check: {_printable(str(error))}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("hpccd-check: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:  # the reader of the output has gone
+        sys.stderr.close()
+        return 0
+    finally:
+        signal.signal(signal.SIGTERM, before)
