@@ -168,9 +168,7 @@ class SequencePage:
         ]
         notes = [f"{self._report.sentence()}.", *(f"{note}." for note in self._report.notes)]
         if left_out:
-            notes.append(
-                f"{left_out:,} of {len(self._report.frames):,} frames are not shown: the page would be too large."
-            )
+            notes.append(f"{left_out:,} of {len(self._report.frames):,} frames are left out to keep the page small.")
         return described(
             Path(self._report.source).name,
             {"azimuth": -60.0, "elevation": 26.0},
