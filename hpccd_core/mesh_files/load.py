@@ -104,11 +104,14 @@ class MeshFile:
         Vertices and polygons as the file numbers them.
     split : callable
         Triangles of polygons, in the order of the file's format.
+    tail : bytes
+        The end of an OBJ file, from its first face on. A file with the same tail has the same faces.
     """
 
     path: Path
     polygons: Polygons
     split: Callable[[Polygons], NDArray[np.int64]] = Polygons.triangles
+    tail: bytes = b""
 
     def faces(self, vertices: NDArray[np.float64] | None = None) -> NDArray[np.uint32]:
         """(F, 3) uint32: triangles. How polygons are split depends on positions; vertices: others than the file's."""
@@ -117,12 +120,19 @@ class MeshFile:
             return self.split(polygons).astype(np.uint32)
 
 
-def load_polygons(path: str | os.PathLike[str]) -> MeshFile:
-    """As `load_mesh`, before polygons are split into triangles."""
+def load_polygons(path: str | os.PathLike[str], last: MeshFile | None = None) -> MeshFile:
+    """As `load_mesh`, before polygons are split into triangles. last: a file that may have the same faces."""
     file = existing(path)
     with _reading(file), _core.StandardArithmetic():  # Python and numpy round in the mode of the thread
-        polygons, split = _parse(file.read_bytes(), file.suffix.lower())
-    return MeshFile(file, polygons, split)
+        data = file.read_bytes()
+        if last is not None and last.tail and data.endswith(last.tail):
+            polygons = obj.with_faces_of(data[: -len(last.tail)], last.polygons)
+            if polygons is not None:
+                _check(polygons.vertices, len(polygons.counts))
+                return dataclasses.replace(last, path=file, polygons=polygons)
+        polygons, split = _parse(data, file.suffix.lower())
+    tail = data[obj.faces_begin(data) :] if file.suffix.lower() == ".obj" else b""
+    return MeshFile(file, polygons, split, tail)
 
 
 @contextlib.contextmanager

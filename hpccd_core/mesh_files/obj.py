@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Wavefront OBJ: the lines v and f. All others are about appearance, or are lines, points and curves."""
 
+import re
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +18,25 @@ def parse(data: bytes) -> Polygons:
         if not reader.read_alike(chunk):
             reader.read(chunk)
     return reader.polygons()
+
+
+def faces_begin(data: bytes) -> int:
+    """The line end before the first face, if no vertex follows it; otherwise the length of the file."""
+    begin = data.find(b"\nf ")
+    return len(data) if begin < 0 or re.search(rb"[\r\n]\s*v\s", data[begin:]) else begin
+
+
+def with_faces_of(head: bytes, last: Polygons) -> Polygons | None:
+    """Positions in the part of a file before its faces, with the faces of a file that ends with the same bytes.
+
+    None if the faces could be others.
+    """
+    if head.endswith((b"\\", b"\\\r")):  # the first face continues this line
+        return None
+    found = parse(head)
+    if len(found.counts) or len(found.vertices) != len(last.vertices):
+        return None
+    return Polygons(found.vertices, last.corners, last.counts)
 
 
 class _Reader:

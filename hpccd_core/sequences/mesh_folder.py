@@ -75,13 +75,13 @@ class MeshFolder(FrameSequence):
         last: tuple[Path, MeshFile, SequenceMesh] | None = self._opened.get(f"last {name}")
         if last is not None and last[0] == path:
             return last[2], last[1].polygons.vertices
-        file = _loaded(path)
+        file = _loaded(path, last[1] if last is not None else None)
         if path.suffix.lower() == ".stl":
             file = self._joined_as_first(name, file)
         if last is not None and _same(file, last[1]):
             mesh = last[2]
             polygons = last[1].polygons  # so that one copy of them stays in memory
-            file = MeshFile(path, dataclasses.replace(polygons, vertices=file.polygons.vertices), file.split)
+            file = dataclasses.replace(file, polygons=dataclasses.replace(polygons, vertices=file.polygons.vertices))
         else:
             vertices = None
             if (file.polygons.counts != 3).any():  # otherwise polygons could be split differently from frame to frame
@@ -112,8 +112,8 @@ class MeshFolder(FrameSequence):
         return MeshFile(file.path, dataclasses.replace(first, vertices=vertices))
 
 
-def _loaded(path: Path) -> MeshFile:
-    return vtk.load(path) if path.suffix.lower() in vtk.SUFFIXES else load_polygons(path)
+def _loaded(path: Path, last: MeshFile | None = None) -> MeshFile:
+    return vtk.load(path) if path.suffix.lower() in vtk.SUFFIXES else load_polygons(path, last)
 
 
 def _same(a: MeshFile, b: MeshFile) -> bool:
@@ -121,6 +121,6 @@ def _same(a: MeshFile, b: MeshFile) -> bool:
     p, q = a.polygons, b.polygons
     return (
         len(p.vertices) == len(q.vertices)
-        and np.array_equal(p.counts, q.counts)
-        and np.array_equal(p.corners, q.corners)
+        and (p.counts is q.counts or np.array_equal(p.counts, q.counts))
+        and (p.corners is q.corners or np.array_equal(p.corners, q.corners))
     )
