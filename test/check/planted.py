@@ -268,8 +268,9 @@ def write_recording(path, shape, frame_ids=("world",), steps=None, version=0, ed
             message = {"version": version, "n_vertices": of_mesh.shape[1]}
             message |= {"faces": faces()[name].reshape(-1).tolist(), "edges": list(edges)}
             writer.write_message(f"/meshes/{name}/topology", topology, _stamped(0, "", message), n, n)
-        for k in range(N_FRAMES):
-            at = N_FRAMES - k if backwards else k
+        n_frames = len(next(iter(shape.values()), ()))
+        for k in range(n_frames):
+            at = n_frames - k if backwards else k
             for n, (name, of_mesh) in enumerate(shape.items()):
                 if name == STATIC and k:
                     continue
