@@ -19,6 +19,7 @@ from hpccd_ros.params import values
 from hpccd_ros.params.parameter_file import read_parameters
 
 SHOWN = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+EXTRAS = "cupy|jax|mujoco|newton|polyscope|pxr|pyvista|torch|warp"  # libraries that not every environment has
 # Time limit for one page; the longest starts a node and plays a few seconds.
 PATIENCE = 240
 # rclpy.spin of a user's program sometimes sleeps on after a SIGTERM (5 of 150 tries with eight at once).
@@ -84,7 +85,7 @@ def usable(program: str) -> bool:
     """Not: programs of a node's clients, which test/client runs beside one; of a GPU and libraries that are absent."""
     if 'results="device"' in program and "gpu" not in hc.backends():
         return False
-    if not all(map(importlib.util.find_spec, re.findall(r"import (cupy|jax|torch|warp)\b", program))):
+    if not all(map(importlib.util.find_spec, re.findall(rf"^(?:from|import) ({EXTRAS})\b", program, re.MULTILINE))):
         return False
     return "client.prepare_environment()" not in program or program.startswith("# ")
 
