@@ -65,7 +65,7 @@ def _filtered(model: Any, parts: Sequence[Part]) -> NDArray[np.bool_]:
         out |= child | child.T
     low, high = np.minimum(body[:, None], body), np.maximum(body[:, None], body)
     out |= np.isin((low << 16) + high, model.exclude_signature)
-    flat = np.isin(model.geom_type[geoms], [mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD])
+    flat = np.isin(model.geom_type[geoms], [int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD)])
     out |= flat[:, None] & flat
     filtered: NDArray[np.bool_] = out & of_geoms[:, None] & of_geoms
     return filtered

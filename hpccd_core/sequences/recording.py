@@ -61,14 +61,12 @@ class Recording(FrameSequence):
 
     @contextlib.contextmanager
     def _errors(self) -> Iterator[None]:
+        exceptions = needed("mcap.exceptions", "mcap", self._path)
         try:
             yield
-        except (SequenceError, OSError):
-            raise
-        except Exception as error:  # mcap passes on any exception of its decompressors and parsers
+        except exceptions.McapError as error:
             raise SequenceError(
-                f"{self._path}: is not a whole MCAP file; if it is cut off or damaged, recover it with hpccd doctor "
-                "--recover"
+                f"{self._path}: is not a whole MCAP file: {shortened(error)}; recover it with hpccd doctor --recover"
             ) from error
 
     def _reader(self) -> Any:

@@ -156,7 +156,6 @@ def reading(source: str) -> Iterator[None]:
         raise SequenceError(f"{where}: cannot be read: {error.strerror or error}; give another file") from error
     except (
         ArithmeticError,
-        AttributeError,
         EOFError,
         LookupError,
         RuntimeError,
