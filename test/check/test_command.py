@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: Apache-2.0
+"""hpccd-check: verdict, exit status and files for planted defects, in all formats, however the work is cut."""
+
+import csv
+import json
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import planted
+import pytest
+from page_parts import Page
+from sources import SOURCES
+
+from hpccd_core.check import Options, check_part, command
+from hpccd_core.check.workers import report_of
+from hpccd_core.sequences import open_sequence
+
+
+def check(*words):
+    """Exit status of hpccd-check with these arguments."""
+    return command.main([str(word) for word in words])
+
+
+def checked(tmp_path, *words):
+    """The report as JSON holds it."""
+    status = check(*words, "--json", tmp_path / "report.json")
+    return status, json.loads((tmp_path / "report.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def npz(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("planted")
+    planted.write_npz(folder, planted.positions())
+    return folder / "planted.npz"
+
+
+@pytest.fixture(scope="module")
+def expected(npz):
+    """Frames and steps of the planted sequence, by one detector that sees them in order."""
+    rows = list(check_part(open_sequence(npz), Options(), 0, planted.N_FRAMES, 1))
+    return [frame for frame, _ in rows], [step for _, step in rows if step is not None]
+
+
+def test_the_defects_are_those_that_were_planted(expected):
+    frames, steps = expected
+    assert {f.index for f in frames if f.intersections} == {k for d in planted.DEFECTS for k in d.frames}
+    assert {f.index for f in frames if f.inside} == {k for d in planted.DEFECTS for k in d.inside}
+    assert {pair for f in frames for pair in f.inside} == {("probe", "body")}
+    found = {s.start for s in steps if s.contacts}
+    wanted = {k for d in planted.DEFECTS for k in d.steps}
+    assert wanted <= found and all({k, k + 1} & {i for d in planted.DEFECTS for i in d.frames} for k in found - wanted)
+    assert all((s.first_toc is None) == (s.contacts == 0) for s in steps)
+
+
+@pytest.mark.parametrize("form", planted.WRITERS)
+def test_the_report_is_the_same_in_all_formats(form, expected, tmp_path, capsys):
+    if form in planted.PACKAGES:
+        pytest.importorskip(planted.PACKAGES[form], reason=f"reading {form} needs the extra check")
+    paths, options = planted.WRITERS[form](tmp_path, planted.positions())
+    words = [f"--{name}" if value is True else f"--{name}={value}" for name, value in options.items()]
+    status, report = checked(tmp_path, *paths, *words)
+    assert status == 1 and report["verdict"] == "defects"
+    frames, steps = expected
+    for row, frame in zip(report["frames"], frames, strict=True):
+        assert (row["index"], row["intersections"], row["distance"]) == (
+            frame.index,
+            frame.intersections,
+            frame.distance,
+        )
+        assert len(row["inside"]) == len(frame.inside)
+        assert "split" in options or [tuple(pair) for pair in row["inside"]] == list(frame.inside)
+    assert report["steps"] == [vars(step) for step in steps]
+    assert "first in frame 10 (" in capsys.readouterr().out.splitlines()[-1]
+
+
+def test_a_clean_sequence(tmp_path, capsys):
+    paths, _ = planted.write_npz(tmp_path, planted.positions([]))
+    status, report = checked(tmp_path, *paths)
+    assert status == 0 and report["verdict"] == "clean"
+    assert not any(frame["intersections"] or frame["inside"] for frame in report["frames"])
+    assert not any(step["contacts"] for step in report["steps"])
+    smallest = min(frame["distance"] for frame in report["frames"])
+    words = f"clean: no contact in 200 frames and 199 steps; smallest distance {smallest:.6g} in frame "
+    assert capsys.readouterr().out.splitlines()[-1].startswith(words)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_overlapping_parts_give_the_same_rows(seed, npz, expected):
+    cuts = sorted(random.Random(seed).sample(range(1, planted.N_FRAMES), 12))
+    rows = []
+    for begin, end in zip([0, *cuts], [*cuts, planted.N_FRAMES], strict=True):
+        rows += check_part(open_sequence(npz), Options(), begin, end, 1)
+    assert ([frame for frame, _ in rows], [step for _, step in rows if step is not None]) == expected
+
+
+def test_reports_are_byte_identical_for_any_number_of_jobs(npz, tmp_path):
+    texts = set()
+    for jobs in (1, 2, 5):
+        files = [tmp_path / f"{jobs}.{kind}" for kind in ("json", "csv")]
+        assert check(npz, "--jobs", jobs, "--json", files[0], "--csv", files[1]) == 1
+        texts.add(tuple(file.read_bytes() for file in files))
+    assert len(texts) == 1
+
+
+def test_dask_gives_the_same_bytes(npz, tmp_path):
+    pytest.importorskip("distributed", reason="needs the extra cluster")
+    assert check(npz, "--json", tmp_path / "alone") == 1
+    assert check(npz, "--cluster", "--jobs", 4, "--json", tmp_path / "dask") == 1
+    assert (tmp_path / "alone").read_bytes() == (tmp_path / "dask").read_bytes()
+
+
+def test_csv_has_a_row_for_each_frame(npz, expected, tmp_path):
+    check(npz, "--csv", tmp_path / "all.csv")
+    rows = list(csv.DictReader((tmp_path / "all.csv").open()))
+    frames, steps = expected
+    for row, frame, step in zip(rows, frames, [*steps, None], strict=True):
+        assert (int(row["index"]), int(row["intersections"])) == (frame.index, frame.intersections)
+        assert row["distance"] == repr(frame.distance)
+        assert row["contacts_to_next"] == ("" if step is None else str(step.contacts))
+        assert row["first_toc"] == ("" if step is None or step.first_toc is None else repr(step.first_toc))
+
+
+def test_page_and_picture_show_the_defects(npz, expected, tmp_path):
+    assert check(npz, "--html", tmp_path / "page.html", "--png", tmp_path / "worst.png") == 1
+    page = Page(tmp_path / "page.html")
+    frames, steps = expected
+    assert [mesh["name"] for mesh in page.said["meshes"]] == list(planted.NAMES)
+    assert [step["step"] for step in page.said["steps"]] == [str(k) for k in range(planted.N_FRAMES)]
+    assert [step["total"] for step in page.said["steps"]] == [0, *(step.contacts for step in steps)]
+    marked = {k for k, step in enumerate(page.said["steps"]) if any(step["intersecting"])}
+    assert marked == {frame.index for frame in frames if frame.intersections}
+    curved = [k for k, step in enumerate(page.said["steps"]) if step["curves"][0]]
+    assert curved and set(curved) <= marked
+    assert page.said["steps"][146]["notices"] == ["probe is inside body."]
+    shape = planted.positions()
+    for k in (0, 10, 199):
+        assert np.abs(page.vertices(1, k) - shape["cloth"][k]).max() <= page.said["meshes"][1]["step"]
+    assert (tmp_path / "worst.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_separation_counts_different_meshes(tmp_path):
+    """Two squares, 1 apart, whose distance on the way is 0.5."""
+    square, faces = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0.0)]), np.array([(0, 1, 2), (0, 2, 3)])
+    above = [np.add(square, (0, 0, z)) for z in (1, 0.5, 1)]
+    np.savez(tmp_path / "two.npz", a_vertices=[square] * 3, a_faces=faces, b_vertices=above, b_faces=faces)
+    assert check(tmp_path / "two.npz") == 0
+    assert check(tmp_path / "two.npz", "--separation", 0.49) == 0
+    status, report = checked(tmp_path, tmp_path / "two.npz", "--separation", 0.5)
+    assert status == 1 and [bool(step["contacts"]) for step in report["steps"]] == [True, True]
+    assert [frame["distance"] for frame in report["frames"]] == [1, 0.5, 1]
+    assert check(tmp_path / "two.npz", "--separation", 0.75) == 1
+
+
+def write_frames(folder, *meshes):
+    """An OBJ file for each of (vertices, faces)."""
+    for k, (vertices, faces) in enumerate(meshes):
+        lines = [f"v {x} {y} {z}" for x, y, z in vertices] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
+        (folder / f"mesh_{k}.obj").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+TRIANGLE = [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]
+SQUARE = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], [(0, 1, 2), (1, 3, 2)]
+
+
+def test_changed_meshes_are_an_error_or_left_out(tmp_path, capsys):
+    folder = write_frames(tmp_path, TRIANGLE, TRIANGLE, SQUARE, SQUARE)
+    assert check(folder, "--jobs", 1) == 2
+    assert "mesh_2.obj: mesh 'mesh' changed from 3 to 4 vertices" in capsys.readouterr().err
+    status, report = checked(tmp_path, folder, "--changes")
+    assert status == 0 and [step["contacts"] for step in report["steps"]] == [0, None, 0]
+    assert "1 of 3 steps not checked, because meshes changed" in capsys.readouterr().out
+    assert check(folder, "--changes", "--html", tmp_path / "page.html") == 0
+    assert [mesh["topologies"] for mesh in Page(tmp_path / "page.html").said["meshes"]][0][1]["faces"] == 2
+
+
+def test_weld_joins_doubled_vertices(tmp_path, capsys):
+    doubled = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2), (3, 4, 5)]
+    torn = [*doubled[0][:3], (1, 0, 1), *doubled[0][4:]], doubled[1]
+    folder = tmp_path / "seam"
+    folder.mkdir()
+    assert check(write_frames(folder, doubled, doubled)) == 1
+    assert check(folder, "--weld") == 0
+    write_frames(folder, doubled, torn)
+    assert check(folder, "--weld") == 2
+    assert "vertices 1 and 3, at one position in the first frame, are apart here" in capsys.readouterr().err
+
+
+def test_several_sequences_in_one_command(npz, tmp_path, capsys):
+    paths, _ = planted.write_npz(tmp_path, planted.positions([]))
+    status, report = checked(tmp_path, npz, *paths)
+    assert status == 1 and report["verdict"] == "defects"
+    assert [one["verdict"] for one in report["sequences"]] == ["defects", "clean"]
+    assert [one["source"] for one in report["sequences"]] == [str(npz), str(paths[0])]
+    assert check(npz, *paths, "--html", tmp_path / "page.html") == 2
+    assert "--html: shows one sequence, 2 are given" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--separation", "nan"), "--separation nan: must be a finite number, 0 or more"),
+        (("--separation", "-1"), "--separation -1.0: must be a finite number, 0 or more"),
+        (("--jobs", "-2"), "--jobs -2: must be 0 or more"),
+        (("--weld", "--changes"), "--weld: joins vertices as in the first frame; leave out --changes"),
+        (("--json", "no/folder/report.json"), "--json no/folder/report.json: there is no folder no/folder; create it"),
+        (("--scheduler", "tcp://127.0.0.1:9"), "--scheduler tcp://127.0.0.1:9: no Dask scheduler responds there"),
+    ],
+)
+def test_wrong_use_is_a_sentence(words, says, npz, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    if words[0] == "--scheduler":
+        distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
+        whole = distributed.Client
+        monkeypatch.setattr(distributed, "Client", lambda address, timeout: whole(address, timeout="2s"))
+    assert check(npz, *words) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"hpccd-check: {says}") and error.count("\n") == 1
+
+
+def test_a_result_replaces_neither_input_nor_another_result(npz, tmp_path, capsys):
+    assert check(npz, "--json", npz) == 2
+    assert f"--json {npz}: is the file of input, too; give another name" in capsys.readouterr().err
+    assert check(npz, "--json", tmp_path / "x", "--csv", tmp_path / "x") == 2
+    assert "is the file of --json, too" in capsys.readouterr().err
+
+
+def test_a_misspelt_option_names_the_nearest(npz, capsys):
+    with pytest.raises(SystemExit) as ended:
+        check(npz, "--sepration", 1)
+    assert ended.value.code == 2 and "did you mean --separation?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_leaves_no_file(number, tmp_path):
+    """While parts are checked."""
+    program = "import sys; from hpccd_core.check.command import main; sys.exit(main())"
+    shape = planted.positions([])
+    many = {name: np.tile(of_mesh, (40, 1, 1)) for name, of_mesh in shape.items()}
+    planted.write_npz(tmp_path, many)
+    process = subprocess.Popen(
+        [sys.executable, "-c", program, "planted.npz", "--json", "report.json"],
+        cwd=tmp_path,
+        env={"PYTHONPATH": SOURCES, "PATH": "/usr/bin"},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 60
+    while not list(tmp_path.glob(".report.json*")) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    time.sleep(0.3)
+    process.send_signal(number)
+    assert process.wait(60) == 130 and process.stderr.read() == "hpccd-check: interrupted\n"
+    assert [file.name for file in tmp_path.iterdir()] == ["planted.npz"]
+
+
+def test_the_ros_command_is_the_same(hpccd, npz, tmp_path):
+    done = hpccd("check", npz, "--json", "report.json")
+    assert done.returncode == 1 and done.stdout.splitlines()[-1].startswith("defects: ")
+    assert check(npz, "--json", tmp_path / "core.json") == 1
+    assert (tmp_path / "report.json").read_bytes() == (tmp_path / "core.json").read_bytes()
+    assert hpccd("check", "no.npz").returncode == 2
+
+
+def test_a_report_of_all_rows(npz, expected):
+    frames, steps = expected
+    rows = list(zip(frames, [*steps, None], strict=True))
+    report = report_of(open_sequence(npz), Options(), rows)
+    assert not report.clean and report.verdict == "defects" and len(report.bad_rows()) > 20
