@@ -16,6 +16,7 @@ from .sequence import SequenceError
 
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+_MOST = 10**8  # elements of an accessor: those without data need no file of that size
 _COMPRESSIONS = {
     "KHR_draco_mesh_compression": "Draco",
     "EXT_meshopt_compression": "meshopt",
@@ -108,6 +109,8 @@ class GltfFile:
         described = self.json["accessors"][number]
         count, width = described["count"], _WIDTHS[described["type"]]
         dtype = np.dtype(_COMPONENTS[described["componentType"]])
+        if not 0 <= count <= _MOST:
+            raise SequenceError(f"{self._path}: accessor {number} has {count} elements; use at most {_MOST}")
         if "bufferView" in described:
             values = self._view(described["bufferView"], described.get("byteOffset", 0), count, width, dtype)
         else:

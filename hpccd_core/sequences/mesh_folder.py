@@ -12,6 +12,7 @@ from ..mesh_files.load import FORMATS, MeshFile, load_polygons
 from . import vtk
 from .numbering import arrange
 from .sequence import FrameSequence, SequenceError, SequenceMesh
+from .topology import same_or
 
 SUFFIXES = (*FORMATS, *vtk.SUFFIXES)
 
@@ -44,6 +45,16 @@ def in_folder(folder: Path) -> list[Path]:
     return next(iter(by_suffix.values()))
 
 
+@dataclasses.dataclass(frozen=True)
+class _Read:
+    """The last file of a mesh. is_settled: files with the same polygons have the same faces, whatever the positions."""
+
+    path: Path
+    file: MeshFile
+    mesh: SequenceMesh
+    is_settled: bool
+
+
 class MeshFolder(FrameSequence):
     """Mesh files, each read when its frame is.
 
@@ -62,7 +73,7 @@ class MeshFolder(FrameSequence):
 
     def _read(self, index: int) -> tuple[str, tuple[SequenceMesh, ...], NDArray[np.float64]]:
         files = [of_mesh[index if len(of_mesh) > 1 else 0] for of_mesh in self._files.values()]
-        pairs = [self._mesh(name, file, index) for name, file in zip(self._files, files, strict=True)]
+        pairs = [self._mesh(name, file) for name, file in zip(self._files, files, strict=True)]
         meshes = tuple(mesh for mesh, _ in pairs)
         last = self._opened.get("meshes", ())
         if len(last) != len(meshes) or any(a is not b for a, b in zip(meshes, last, strict=True)):
@@ -70,26 +81,33 @@ class MeshFolder(FrameSequence):
         moving = [file.name for file, of_mesh in zip(files, self._files.values(), strict=True) if len(of_mesh) > 1]
         return ", ".join(moving or [file.name for file in files]), last, np.concatenate([v for _, v in pairs])
 
-    def _mesh(self, name: str, path: Path, index: int) -> tuple[SequenceMesh, NDArray[np.float64]]:
-        """A mesh, the same object as in the frame before if its topology is the same, and its positions."""
-        last: tuple[Path, MeshFile, SequenceMesh] | None = self._opened.get(f"last {name}")
-        if last is not None and last[0] == path:
-            return last[2], last[1].polygons.vertices
-        file = _loaded(path, last[1] if last is not None else None)
+    def _mesh(self, name: str, path: Path) -> tuple[SequenceMesh, NDArray[np.float64]]:
+        """A mesh, the same object as in the frame before if its topology is the same, and its positions.
+
+        How polygons are split depends on positions. Those of the first frame count wherever the polygons are the same:
+        faces neither change from frame to frame nor depend on the frame that was read before.
+        """
+        last: _Read | None = self._opened.get(f"last {name}")
+        if last is not None and last.path == path:
+            return last.mesh, last.file.polygons.vertices
+        file = _loaded(path, None if last is None else last.file)
         if path.suffix.lower() == ".stl":
             file = self._joined_as_first(name, file)
-        if last is not None and _same(file, last[1]):
-            mesh = last[2]
-            polygons = last[1].polygons  # so that one copy of them stays in memory
-            file = dataclasses.replace(file, polygons=dataclasses.replace(polygons, vertices=file.polygons.vertices))
-        else:
-            vertices = None
-            if (file.polygons.counts != 3).any():  # otherwise polygons could be split differently from frame to frame
-                first = self._first(name)
-                vertices = first.polygons.vertices if _same(file, first) else None
-            mesh = SequenceMesh(name, file.faces(vertices), len(file.polygons.vertices))
-        self._opened[f"last {name}"] = path, file, mesh
-        return mesh, file.polygons.vertices
+        vertices = file.polygons.vertices
+        if last is not None and _same(file, last.file):  # one copy of the polygons stays in memory
+            file = dataclasses.replace(file, polygons=dataclasses.replace(last.file.polygons, vertices=vertices))
+            if last.is_settled:
+                self._opened[f"last {name}"] = _Read(path, file, last.mesh, True)
+                return last.mesh, vertices
+        shape, is_settled = None, True
+        if (file.polygons.counts != 3).any():
+            first = self._first(name)
+            is_settled = _same(file, first)
+            shape = first.polygons.vertices if is_settled else None
+        mesh = SequenceMesh(name, file.faces(shape), len(vertices))
+        (mesh,) = same_or(None if last is None else (last.mesh,), (mesh,))
+        self._opened[f"last {name}"] = _Read(path, file, mesh, is_settled)
+        return mesh, vertices
 
     def _first(self, name: str) -> MeshFile:
         key = f"first {name}"

@@ -61,12 +61,14 @@ class Recording(FrameSequence):
 
     @contextlib.contextmanager
     def _errors(self) -> Iterator[None]:
-        exceptions = needed("mcap.exceptions", "mcap", self._path)
         try:
             yield
-        except exceptions.McapError as error:
+        except (SequenceError, OSError):
+            raise
+        except Exception as error:  # mcap passes on any exception of its decompressors and parsers
             raise SequenceError(
-                f"{self._path}: is not a whole MCAP file: {shortened(error)}; recover it with hpccd doctor --recover"
+                f"{self._path}: is not a whole MCAP file; if it is cut off or damaged, recover it with hpccd doctor "
+                "--recover"
             ) from error
 
     def _reader(self) -> Any:

@@ -156,6 +156,7 @@ def reading(source: str) -> Iterator[None]:
         raise SequenceError(f"{where}: cannot be read: {error.strerror or error}; give another file") from error
     except (
         ArithmeticError,
+        AttributeError,
         EOFError,
         LookupError,
         RuntimeError,

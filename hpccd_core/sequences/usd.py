@@ -141,27 +141,29 @@ class UsdStage(FrameSequence):
         return np.array(points, np.float64)
 
     def _mesh(self, name: str, mesh: Any, points: NDArray[np.float64], time: Any) -> SequenceMesh:
-        """Polygons are split as in the first frame: their shape could change how."""
-        unchanged: SequenceMesh
-        usd = self._module("Usd")
+        """Polygons are split by their shape in the first frame wherever it has the same, as in MeshFolder."""
         counts, corners = self._polygons(mesh, time)
-        key = f"mesh {name}"
-        if key in self._opened:
-            last_counts, last_corners, unchanged = self._opened[key]
-            if unchanged.n_vertices == len(points) and _equal(counts, last_counts) and _equal(corners, last_corners):
-                return unchanged
-        if (counts > 3).any() and self._times:
-            first = usd.TimeCode(self._times[0])
-            then = self._polygons(mesh, first)
-            if _equal(counts, then[0]) and _equal(corners, then[1]):
-                reference = self._points(mesh, first)
-                points = reference if len(reference) == len(points) else points
+        last: tuple[NDArray[np.int64], NDArray[np.int64], SequenceMesh] | None = self._opened.get(f"settled {name}")
+        if (
+            last is not None
+            and last[2].n_vertices == len(points)
+            and _equal(counts, last[0])
+            and _equal(corners, last[1])
+        ):
+            return last[2]
+        is_settled = not (counts > 3).any() or not self._times
+        if not is_settled:
+            first = self._module("Usd").TimeCode(self._times[0])
+            shape, then = self._points(mesh, first), self._polygons(mesh, first)
+            if len(shape) == len(points) and _equal(counts, then[0]) and _equal(corners, then[1]):
+                points, is_settled = shape, True
         polygons = checked_polygons(f"{self._path}: {mesh.GetPath()}", points, corners, counts)
         faces = polygons.triangles().astype(np.uint32)
         if mesh.GetOrientationAttr().Get() == "leftHanded":
             faces = faces[:, [0, 2, 1]]
         made = SequenceMesh(name, np.ascontiguousarray(faces), len(points))
-        self._opened[key] = counts, corners, made
+        if is_settled:
+            self._opened[f"settled {name}"] = counts, corners, made
         return made
 
     def _polygons(self, mesh: Any, time: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
