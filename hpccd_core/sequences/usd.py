@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..mesh_files.errors import shortened
+from ..mesh_files.errors import MeshFileError, shortened
 from .packages import needed
 from .sequence import FrameSequence, SequenceError, SequenceMesh
 from .topology import checked_polygons, same_or, short_names
@@ -157,8 +157,13 @@ class UsdStage(FrameSequence):
             shape, then = self._points(mesh, first), self._polygons(mesh, first)
             if len(shape) == len(points) and _equal(counts, then[0]) and _equal(corners, then[1]):
                 points, is_settled = shape, True
-        polygons = checked_polygons(f"{self._path}: {mesh.GetPath()}", points, corners, counts)
-        faces = polygons.triangles().astype(np.uint32)
+        what = f"{self._path}: {mesh.GetPath()}"
+        try:
+            faces = checked_polygons(what, points, corners, counts).triangles().astype(np.uint32)
+        except SequenceError:
+            raise
+        except MeshFileError as error:
+            raise SequenceError(f"{what}: {error}") from error
         if mesh.GetOrientationAttr().Get() == "leftHanded":
             faces = faces[:, [0, 2, 1]]
         made = SequenceMesh(name, np.ascontiguousarray(faces), len(points))
