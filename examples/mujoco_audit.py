@@ -110,19 +110,6 @@ def orientation(a: Point, b: Point, c: Point, d: Point) -> int:
     return (volume > 0) - (volume < 0)
 
 
-def deep_inside(solid: list[Simplex], points: set[Point], depth: float) -> bool:
-    """Whether all points are farther than `depth` behind the plane of each face of a convex solid."""
-    if len(solid) < 4 or any(len(face) != 3 for face in solid):
-        return False
-    for a, b, c in solid:
-        normal = cross(minus(b, a), minus(c, a))
-        for point in points:
-            behind = -dot(normal, minus(point, a))
-            if behind <= 0 or behind**2 <= Fraction(depth) ** 2 * dot(normal, normal):
-                return False
-    return True
-
-
 # One model.
 
 
@@ -299,20 +286,15 @@ class Audit:
     def faces(self) -> np.ndarray:
         return self.detector.intersections(self.before).faces
 
-    def apart(self, pair: Pair, vertices: np.ndarray) -> str:
-        """Where the surfaces are, decided exactly: "inside" or "outside", or "" if they are within their separation."""
+    def apart(self, pair: Pair, vertices: np.ndarray) -> bool:
+        """Whether the surfaces of a pair are farther apart than their separation, decided exactly."""
         (part_a, of_a), (part_b, of_b) = (self.simplices(side) for side in sorted(pair))
         separation = self.separation(part_a, part_b)
         at = functools.cache(lambda k: exact(vertices[k]))
         for part, of_other in ((part_a, of_b), (part_b, of_a)):
             if part in self.planes:
-                touch = any(self.touch(((k,), part, separation), at) for s in of_other for k in s)
-                return "" if touch else "outside"
-        for solid, other in ((of_a, of_b), (of_b, of_a)):
-            if deep_inside([tuple(map(at, s)) for s in solid], {at(k) for s in other for k in s}, separation):
-                return "inside"
-        touch = any(self.touch((p, q, separation), at) for p, q in itertools.product(of_a, of_b))
-        return "" if touch else "outside"
+                return not any(self.touch(((k,), part, separation), at) for s in of_other for k in s)
+        return not any(self.touch((p, q, separation), at) for p, q in itertools.product(of_a, of_b))
 
     def step(self) -> None:
         self.data.ctrl[:1] += SWEEP * self.model.opt.timestep
@@ -329,9 +311,8 @@ class Audit:
             count["dropped at the cap" if self.is_full(pair) else "left out"] += 1
             self.decided(self.touch(ours[pair], lambda k: exact(end[k])))
         for pair in theirs - set(ours):
-            apart = self.apart(pair, end)
-            count["inside a solid" if apart == "inside" else "beyond the radius"] += 1
-            self.decided(bool(apart))
+            count["only MuJoCo"] += 1
+            self.decided(self.apart(pair, end))
         self.between_frames(start, end, self.known | theirs | set(ours))
         self.before, self.known = end, theirs | set(ours)
 
@@ -385,7 +366,7 @@ class Audit:
         self.counts["for hpccd"] += for_hpccd
 
 
-COLUMNS = ("steps", "MuJoCo", "hpccd", "both", "dropped at the cap", "left out", "inside a solid", "beyond the radius")
+COLUMNS = ("steps", "MuJoCo", "hpccd", "both", "dropped at the cap", "left out", "only MuJoCo")
 COLUMNS += ("passed through", "touched and left", "decided", "for hpccd")
 
 

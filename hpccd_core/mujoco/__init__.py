@@ -169,13 +169,15 @@ class MujocoScene:
         Raises
         ------
         TypeError, ValueError
-            If `data` is not the data of such a model.
+            If `data` is not the data of such a model, or has no positions yet.
         """
         if not isinstance(data, mujoco.MjData):
             raise TypeError(f"data: expected mujoco.MjData, got {type(data).__name__}; make one with MjData(model)")
         for name, n in (("flexvert_xpos", self._model.nflexvert), ("geom_xpos", self._model.ngeom)):
             if (got := len(getattr(data, name))) != n:
                 raise ValueError(f"data: {name} has {got} rows, the model {n}; give data of the same model")
+        if not data.xmat[0].any():  # of the world
+            raise ValueError("data: has no positions yet; call mujoco.mj_forward(model, data) first")
         n = len(self._rows)
         positions = np.empty((n + len(self._local), 3))
         positions[:n] = data.flexvert_xpos[self._rows]

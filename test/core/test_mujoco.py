@@ -257,6 +257,11 @@ def test_rules_and_options_reach_the_detector():
         (lambda m: MujocoScene(m, tolerance=1e-9), ValueError, "tolerance: 1e-09 needs too many triangles for geom"),
         (lambda m: MujocoScene(m).vertices(m), TypeError, "data: expected mujoco.MjData, got MjModel; make one with"),
         (lambda m: MujocoScene(m).vertices(load(flex(2))[1]), ValueError, "data: geom_xpos has 0 rows, the model 3"),
+        (
+            lambda m: MujocoScene(m).step(mujoco.MjData(m)),
+            ValueError,
+            "data: has no positions yet; call mujoco.mj_forw",
+        ),
         (lambda m: MujocoScene(m, acuracy="fast").detector, TypeError, "no option 'acuracy'.*did you mean accuracy"),
     ],
 )
