@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Surfaces in VTK and VTU files: polygons, and the boundaries of tetrahedra."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +68,9 @@ def _of_vtu(path: Path) -> Cells:
         corners.append(cells.reshape(-1))
         counts.append(np.full(len(cells), cells.shape[1]))
         types.append(np.full(len(cells), _OF_MESHIO[block.type]))
+    declared = sum(map(int, re.findall(rb"NumberOfCells\s*=\s*[\"'](\d+)", path.read_bytes())))
+    if (left_out := declared - sum(map(len, counts))) > 0:  # meshio only warns
+        raise SequenceError(f"{path}: cells of other types: {left_out}; extract its surface as triangles or polygons")
     return Cells(points, *(np.concatenate(parts) for parts in (corners, counts, types)))
 
 

@@ -155,6 +155,16 @@ add("vtk_face_out_of_range", "names vertex 7", in_file("a.vtk", POLY_DATA.replac
 add("vtk_of_voxels", "data set STRUCTURED_POINTS", in_file("a.vtk", POLY_DATA.replace("POLYDATA", "STRUCTURED_POINTS")))
 add("vtk_strips", "has triangle strips", in_file("a.vtk", POLY_DATA.replace("POLYGONS", "TRIANGLE_STRIPS")))
 add("text_as_vtu", "cannot be read as VTU", in_file("a.vtu", "hello"), "meshio")
+VOXEL = """<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian"><UnstructuredGrid>
+<Piece NumberOfPoints="8" NumberOfCells="1">
+<Points><DataArray type="Float32" NumberOfComponents="3" format="ascii">
+0 0 0 1 0 0 0 1 0 1 1 0 0 0 1 1 0 1 0 1 1 1 1 1</DataArray></Points>
+<Cells><DataArray type="Int32" Name="connectivity" format="ascii">0 1 2 3 4 5 6 7</DataArray>
+<DataArray type="Int32" Name="offsets" format="ascii">8</DataArray>
+<DataArray type="UInt8" Name="types" format="ascii">11</DataArray></Cells>
+</Piece></UnstructuredGrid></VTKFile>"""
+add("vtu_of_voxels", "cells of other types: 1", in_file("a.vtu", VOXEL), "meshio")
+add("vtu_of_hexahedra", "has cells of type hexahedron", in_file("a.vtu", VOXEL.replace(">11<", ">12<")), "meshio")
 add("vtu_cut_off", "cannot be read as VTU", in_file("a.vtu", "<VTKFile type='UnstructuredGrid'><Unstr"), "meshio")
 
 
