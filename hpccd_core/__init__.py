@@ -21,6 +21,7 @@ from .free_motion import CollisionFreeMotion
 from .mesh_files.errors import MeshFileError
 from .mesh_files.load import load_mesh
 from .mesh_files.welding import weld
+from .plotting import plot
 from .prepared import PreparedDetection
 from .proximity import Gap, Intersections, Proximity
 from .results import OutputNotComputed
@@ -53,6 +54,7 @@ __all__ = [
     "closed",
     "gpu_status",
     "load_mesh",
+    "plot",
     "shapes",
     "test_edge_edge",
     "test_vertex_face",

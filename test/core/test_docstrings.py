@@ -23,6 +23,8 @@ EXTRAS = {
     "hpccd_core.jax": "jax",
     "hpccd_core.mujoco": "mujoco",
     "hpccd_core.warp": "newton",
+    "hpccd_core.usd": "pxr",
+    "hpccd_core.plotting": "pyvista",
 }  # modules, and the package that each needs
 
 
