@@ -48,8 +48,27 @@ def open_sequence(
 
     Notes
     -----
-    The last digits of a file name are its frame number. Files with other names are other meshes of the same frames, as
-    in ``cloth_0001.obj``, ``body_0001.obj``; a single file beside many is a static mesh.
+    What each format contains, and what is ignored or rejected:
+
+    - Mesh files (OBJ, PLY, STL and DAE as for :func:`hpccd_core.load_mesh`; VTK, VTU): the last digits of a name are
+      the frame number; numbers that are missing are in ``gaps``, relative to the usual difference. Files with other
+      names are other meshes of the same frames, as in ``cloth_0001.obj``, ``body_0001.obj``; a single file beside many
+      is a static mesh. A folder may contain other files, but only one of these formats. STL has no vertex numbers:
+      corners are joined as in the first frame where that fits. Of VTK: polygons, and the boundaries of tetrahedra.
+    - NPZ, NPY: positions (frames, vertices, 3) in float16, float32 or float64, read one frame at a time. Their names in
+      NPZ are ``vertices``, ``positions``, ``points`` or ``v``, with ``faces``, ``triangles`` or ``f`` (faces, 3); of
+      several meshes ``NAME_vertices`` and ``NAME_faces``. Positions (vertices, 3) are those of a static mesh.
+    - USD: all Mesh prims with references, payloads and instances, at the times of all samples of points, topology and
+      transforms; placed by their transforms, in metres. Ignored: visibility, holes, subdivision, purposes guide and
+      proxy, other prims. Rejected: skeletons and blend shapes that are not baked.
+    - glTF, GLB: nodes of the default scene at the key times of all animations, with morph targets and skins. Vertices
+      that coincide in all frames, as at seams of textures, are joined. Rejected: Draco and meshopt.
+    - PC2, MDD: positions of one mesh.
+    - MCAP: recordings of the ROS node whose meshes all come from MeshVertices in one coordinate frame. Frames are
+      joined by their stamps.
+
+    Polygons are split into triangles by their shape in the first frame, so that faces do not change while a mesh
+    deforms. NaN, infinities and coordinates beyond 1e150 are rejected.
 
     Examples
     --------
