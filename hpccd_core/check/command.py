@@ -88,9 +88,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     speed = parser.add_argument_group("speed")
     speed.add_argument(
-        "--jobs", type=int, default=0, metavar="N", help="parts checked at once; 0: one for each core (default)"
+        "--jobs", type=int, default=0, metavar="N", help="processes; 0: one for each core (default), 1: this one"
     )
-    speed.add_argument("--cluster", action="store_true", help="check in processes, with Dask, instead of threads")
+    speed.add_argument("--cluster", action="store_true", help="check with Dask: its own processes on this machine")
     speed.add_argument(
         "--scheduler", metavar="ADDRESS", help="a Dask cluster whose workers see the files under the same names"
     )
@@ -203,7 +203,7 @@ def _reports(sequences: list[FrameSequence], options: Options, args: argparse.Na
     with counting("frames", sum(map(len, sequences))) as progress:
         if not (args.cluster or args.scheduler):
             return [
-                workers.report_of(sequence, options, workers.in_threads(sequence, options, args.jobs, progress))
+                workers.report_of(sequence, options, workers.in_processes(sequence, options, args.jobs, progress))
                 for sequence in sequences
             ]
         most = sum(workers.n_parts(sequence) for sequence in sequences)

@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Check the parts of a sequence side by side: in threads, or on a Dask cluster."""
+"""Check the parts of a sequence side by side: in processes of this machine, or on a Dask cluster."""
 
 from __future__ import annotations
 
 import contextlib
+import multiprocessing.connection
+import multiprocessing.synchronize
 import os
-import pickle
+import signal
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
 from ..sequences import FrameSequence
@@ -17,16 +20,14 @@ from .report import FrameResult, Report, StepResult
 
 # Frames of a part. The frame after a part is read twice, once by the next part.
 PART = 16
+# Below this many frames, the start of processes (0.5 s) is most of the time.
+SHORT = 64
 
 Row = tuple[FrameResult, StepResult | None]
 
 
 class ClusterError(Exception):
-    """There is no usable Dask cluster. The message names the remedy."""
-
-
-class Stopped(Exception):
-    """A part was given up, because another one failed or the user interrupted."""
+    """There is no usable Dask cluster, or a process ended. The message names the remedy."""
 
 
 def report_of(sequence: FrameSequence, options: Options, rows: list[Row], notes: tuple[str, ...] = ()) -> Report:
@@ -35,37 +36,70 @@ def report_of(sequence: FrameSequence, options: Options, rows: list[Row], notes:
     return Report(sequence.source, [frame for frame, _ in rows], steps, sequence.notes + notes, options.separation)
 
 
-def in_threads(
+def in_processes(
     sequence: FrameSequence, options: Options, jobs: int = 0, progress: Callable[[], None] = lambda: None
 ) -> list[Row]:
-    """The rows of all frames, by `jobs` threads that each read and check parts; 0: one for each core.
+    """The rows of all frames, by `jobs` processes that each read and check parts; 0: one for each core.
 
-    progress is called after each frame. Raises SequenceError, that of the first part that failed.
+    Processes, because parsers of text hold the interpreter lock. Short sequences are checked in this one. progress is
+    called after each frame of a finished part. Raises SequenceError, that of the first part that failed, and
+    ClusterError if a process ends early.
     """
     cores = len(os.sched_getaffinity(0))
-    parts = _parts(len(sequence))
-    jobs = min(jobs or cores, len(parts))
-    stop = threading.Event()
-    own = threading.local()  # readers keep files open, each thread its own
-
-    def rows_of(begin: int, end: int) -> list[Row]:
-        if not hasattr(own, "sequence"):
-            own.sequence = pickle.loads(pickle.dumps(sequence))
-        rows = []
-        for row in check_part(own.sequence, options, begin, end, max(1, cores // jobs)):
-            if stop.is_set():
-                raise Stopped
+    jobs = min(jobs or cores, n_parts(sequence)) if len(sequence) >= SHORT else 1
+    rows: list[Row] = []
+    if jobs == 1:
+        for row in check_part(sequence, options, 0, len(sequence)):
             rows.append(row)
             progress()
         return rows
+    context = multiprocessing.get_context("spawn")
+    stop = context.Event()
+    pool = ProcessPoolExecutor(jobs, context, initializer=_begin, initargs=(stop,))
+    try:
+        futures = [
+            pool.submit(_rows_until_stopped, sequence, options, *part, max(1, cores // jobs))
+            for part in _parts(len(sequence))
+        ]
+        for future in futures:
+            of_part = future.result()
+            rows += of_part
+            for _ in of_part:
+                progress()
+    except BrokenProcessPool as error:
+        raise ClusterError("--jobs: a process was ended, perhaps for lack of memory; try fewer jobs") from error
+    finally:
+        stop.set()
+        pool.shutdown(cancel_futures=True)
+    return rows
 
-    with ThreadPoolExecutor(jobs) as pool:
-        futures = [pool.submit(rows_of, *part) for part in parts]
-        try:
-            return [row for future in futures for row in future.result()]
-        finally:
-            stop.set()
-            pool.shutdown(cancel_futures=True)
+
+_stop: multiprocessing.synchronize.Event | None = None
+
+
+def _begin(stop: multiprocessing.synchronize.Event) -> None:
+    """Begin a process of `in_processes`: an interrupt is the parent's to handle; when that has ended, so does this."""
+    global _stop
+    _stop = stop
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def end_with(sentinel: int) -> None:
+        multiprocessing.connection.wait([sentinel])
+        os._exit(1)
+
+    threading.Thread(target=end_with, args=(parent.sentinel,), daemon=True).start()
+
+
+def _rows_until_stopped(sequence: FrameSequence, options: Options, begin: int, end: int, threads: int) -> list[Row]:
+    """The rows of a part; fewer after an interrupt."""
+    rows = []
+    for row in check_part(sequence, options, begin, end, threads):
+        if _stop is None or _stop.is_set():
+            break
+        rows.append(row)
+    return rows
 
 
 def on_cluster(

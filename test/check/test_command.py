@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """hpccd-check: verdict, exit status and files for planted defects, in all formats, however the work is cut."""
 
+import contextlib
 import csv
 import json
+import os
 import random
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import planted
@@ -235,27 +238,74 @@ def test_a_misspelt_option_names_the_nearest(npz, capsys):
     assert ended.value.code == 2 and "did you mean --separation?" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupt_leaves_no_file(number, tmp_path):
-    """While parts are checked."""
-    program = "import sys; from hpccd_core.check.command import main; sys.exit(main())"
+@pytest.fixture
+def long_check(tmp_path):
+    """hpccd-check of 8,000 frames in two processes, which are running; and the process numbers of these."""
+    program = "import sys; from hpccd_core.check.command import main\nif __name__ == '__main__': sys.exit(main())"
+    (tmp_path / "program.py").write_text(program)
     shape = planted.positions([])
-    many = {name: np.tile(of_mesh, (40, 1, 1)) for name, of_mesh in shape.items()}
-    planted.write_npz(tmp_path, many)
+    planted.write_npz(tmp_path, {name: np.tile(of_mesh, (40, 1, 1)) for name, of_mesh in shape.items()})
     process = subprocess.Popen(
-        [sys.executable, "-c", program, "planted.npz", "--json", "report.json"],
+        [sys.executable, "program.py", "planted.npz", "--jobs", "2", "--json", "report.json"],
         cwd=tmp_path,
         env={"PYTHONPATH": SOURCES, "PATH": "/usr/bin"},
         stderr=subprocess.PIPE,
         text=True,
+        start_new_session=True,
     )
+    try:
+        yield process, workers_of(process)
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def workers_of(process):
+    """Its children that have loaded the core, when there are two."""
     deadline = time.monotonic() + 60
-    while not list(tmp_path.glob(".report.json*")) and time.monotonic() < deadline:
-        time.sleep(0.02)
-    time.sleep(0.3)
+    while time.monotonic() < deadline and process.poll() is None:
+        children = [
+            int(child) for child in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        ]
+        loaded = [child for child in children if "_core" in maps(child)]
+        if len(loaded) == 2:
+            return loaded
+        time.sleep(0.05)
+    raise AssertionError(f"no workers; {process.poll()}")
+
+
+def maps(process):
+    try:
+        return Path(f"/proc/{process}/maps").read_text()
+    except OSError:  # it has ended
+        return ""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_leaves_no_file(number, long_check, tmp_path):
+    process, workers = long_check
     process.send_signal(number)
     assert process.wait(60) == 130 and process.stderr.read() == "hpccd-check: interrupted\n"
-    assert [file.name for file in tmp_path.iterdir()] == ["planted.npz"]
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["planted.npz", "program.py"]
+    assert not any(map(maps, workers))
+
+
+def test_a_killed_worker_is_a_sentence(long_check, tmp_path):
+    process, workers = long_check
+    os.kill(workers[0], signal.SIGKILL)
+    assert process.wait(60) == 2
+    assert process.stderr.read().startswith("hpccd-check: --jobs: a process was ended, perhaps for lack of memory; try")
+    assert not (tmp_path / "report.json").exists()
+
+
+def test_workers_end_with_a_killed_command(long_check):
+    process, workers = long_check
+    process.kill()
+    deadline = time.monotonic() + 20
+    while any(map(maps, workers)):
+        assert time.monotonic() < deadline, "workers go on without the command"
+        time.sleep(0.05)
 
 
 def test_the_ros_command_is_the_same(hpccd, npz, tmp_path):
