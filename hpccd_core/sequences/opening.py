@@ -59,8 +59,8 @@ def open_sequence(
       NPZ are ``vertices``, ``positions``, ``points`` or ``v``, with ``faces``, ``triangles`` or ``f`` (faces, 3); of
       several meshes ``NAME_vertices`` and ``NAME_faces``. Positions (vertices, 3) are those of a static mesh.
     - USD: all Mesh prims with references, payloads and instances, at the times of all samples of points, topology and
-      transforms; placed by their transforms, in metres. Ignored: visibility, holes, subdivision, purposes guide and
-      proxy, other prims. Rejected: skeletons and blend shapes that are not baked.
+      transforms; placed by their transforms, in metres. Ignored: invisible meshes, purposes guide and proxy,
+      holes, subdivision, other prims. Rejected: skeletons and blend shapes that are not baked.
     - glTF, GLB: nodes of the default scene at the key times of all animations, with morph targets and skins. Vertices
       that coincide in all frames, as at seams of textures, are joined. Rejected: Draco and meshopt.
     - PC2, MDD: positions of one mesh.

@@ -31,7 +31,8 @@ class UsdStage(FrameSequence):
         stage = self._stage()
         prims, notes = self._meshes_of(stage)
         if not prims:
-            raise SequenceError(f"{path}: has no Mesh prims; export surfaces as meshes")
+            others = f" ({shortened('; '.join(notes))})" if notes else ""
+            raise SequenceError(f"{path}: has no Mesh prims{others}; export surfaces as meshes")
         names = short_names([str(prim.GetPath()) for prim in prims], "/")
         self._prims = dict(sorted(zip(names, (str(prim.GetPath()) for prim in prims), strict=True)))
         self._times = sorted(set().union(*(self._samples(prim) for prim in prims)))
@@ -62,7 +63,7 @@ class UsdStage(FrameSequence):
     def _meshes_of(self, stage: Any) -> tuple[list[Any], list[str]]:
         """Mesh prims in the order of the stage, and notes about all other prims."""
         geom, usd = self._module("UsdGeom"), self._module("Usd")
-        prims, left_out, others, subdivided, holes, hidden = [], [], set(), 0, 0, []
+        prims, left_out, hidden, others, subdivided, holes, flickering = [], [], [], set(), 0, 0, 0
         walk = iter(usd.PrimRange.Stage(stage, usd.TraverseInstanceProxies()))
         for prim in walk:
             if prim.IsA(geom.PointInstancer):
@@ -72,12 +73,14 @@ class UsdStage(FrameSequence):
                 if geom.Imageable(prim).ComputePurpose() in _LEFT_OUT:
                     left_out.append(str(prim.GetPath()))
                     continue
+                if not (visible := self._visible(prim)).any():
+                    hidden.append(str(prim.GetPath()))
+                    continue
                 self._check_not_skinned(prim)
                 mesh = geom.Mesh(prim)
                 subdivided += mesh.GetSubdivisionSchemeAttr().Get() != "none"
                 holes += bool(mesh.GetHoleIndicesAttr().Get())
-                if geom.Imageable(prim).ComputeVisibility(usd.TimeCode.EarliestTime()) == "invisible":
-                    hidden.append(str(prim.GetPath()))
+                flickering += not visible.all()
                 prims.append(prim)
             elif prim.IsA(geom.Gprim):
                 others.add(str(prim.GetTypeName()))
@@ -87,7 +90,9 @@ class UsdStage(FrameSequence):
         if left_out:
             notes.append(f"meshes of purpose guide or proxy are left out: {shortened(', '.join(left_out))}")
         if hidden:
-            notes.append(f"visibility is not considered; invisible: {shortened(', '.join(hidden))}")
+            notes.append(f"invisible meshes are left out: {shortened(', '.join(hidden))}")
+        if flickering:
+            notes.append(f"meshes that are invisible for a while ({flickering}) are in all frames")
         if subdivided:
             notes.append(f"subdivision surfaces ({subdivided}): their control meshes are used")
         if holes:
@@ -100,6 +105,17 @@ class UsdStage(FrameSequence):
                 raise SequenceError(
                     f"{self._path}: {prim.GetPath()} is moved by a skeleton or blend shapes; bake it into points"
                 )
+
+    def _visible(self, prim: Any) -> NDArray[np.bool_]:
+        """Whether a mesh is visible, at each time at which that changes."""
+        geom, time = self._module("UsdGeom"), self._module("Usd").TimeCode
+        times = [time.EarliestTime()]
+        above = prim
+        while above and not above.IsPseudoRoot():
+            if imageable := geom.Imageable(above):
+                times += map(time, imageable.GetVisibilityAttr().GetTimeSamples())
+            above = above.GetParent()
+        return np.array([geom.Imageable(prim).ComputeVisibility(at) != "invisible" for at in times])
 
     def _samples(self, prim: Any) -> set[float]:
         """Times at which a mesh or one of its transforms has a sample."""

@@ -137,20 +137,24 @@ def test_prims_that_are_left_out_are_named(tmp_path):
     add(stage, "/cloth").GetSubdivisionSchemeAttr().Set("catmullClark")
     add(stage, "/render/guide").GetPurposeAttr().Set("guide")
     add(stage, "/proxy").GetPurposeAttr().Set("proxy")
-    hidden = add(stage, "/hidden")
-    hidden.MakeInvisible()
-    hidden.GetHoleIndicesAttr().Set([0])
+    add(stage, "/group/hidden")
+    UsdGeom.Xform.Define(stage, "/group").MakeInvisible()
+    blinking = add(stage, "/blinking")
+    for time, visibility in ((0.0, "invisible"), (1.0, "inherited")):
+        blinking.GetVisibilityAttr().Set(visibility, time)
+    blinking.GetHoleIndicesAttr().Set([0])
     UsdGeom.Sphere.Define(stage, "/ball")
     instancer = UsdGeom.PointInstancer.Define(stage, "/grass")
     add(stage, "/grass/prototypes/blade")
     instancer.CreatePrototypesRel().AddTarget("/grass/prototypes/blade")
     stage.Save()
     sequence, (frame,) = frames(tmp_path / "a.usda")
-    assert [mesh.name for mesh in frame.meshes] == ["cloth", "hidden"]
+    assert [mesh.name for mesh in frame.meshes] == ["blinking", "cloth"]
     assert sequence.notes[2:] == (
         "prims that are not meshes are left out: PointInstancer, Sphere",
         "meshes of purpose guide or proxy are left out: /render/guide, /proxy",
-        "visibility is not considered; invisible: /hidden",
+        "invisible meshes are left out: /group/hidden",
+        "meshes that are invisible for a while (1) are in all frames",
         "subdivision surfaces (1): their control meshes are used",
         "holes of meshes (1) are filled",
     )
