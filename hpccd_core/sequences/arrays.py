@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from .sequence import FrameSequence, SequenceError, SequenceMesh
 from .topology import FACE_NAMES, checked_faces, faces_of_file
 
+SUFFIXES = (".npz", ".npy")
 _POSITION_NAMES = ("vertices", "positions", "points", "v")
 _NAMED = re.compile(rf"(?:(.*)[_./])?({'|'.join(_POSITION_NAMES + FACE_NAMES)})", re.DOTALL)
 

@@ -7,16 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..mesh_files.errors import shortened
-from . import gltf, usd
-from .arrays import ArrayFile
+from . import arrays, gltf, point_caches, recording, usd
 from .mesh_folder import SUFFIXES, MeshFolder, in_folder
-from .point_caches import PointCache
-from .recording import Recording
 from .sequence import FrameSequence, SequenceError, reading
 from .splitting import SplitSequence
 
 # Formats that hold all frames in one file.
-WHOLE = (".npz", ".npy", ".pc2", ".mdd", *usd.SUFFIXES, *gltf.SUFFIXES, ".mcap")
+WHOLE = (*arrays.SUFFIXES, *usd.SUFFIXES, *gltf.SUFFIXES, *point_caches.SUFFIXES, *recording.SUFFIXES)
 PathLike = str | os.PathLike[str]
 
 
@@ -29,9 +26,9 @@ def open_sequence(
     ----------
     paths : str, os.PathLike, or a sequence of them
         A folder of mesh files, a pattern such as ``"frames/*.obj"``, or files in any order; or one NPZ, NPY, USD, glTF,
-        PC2, MDD or MCAP file with all frames.
+        PC2, PC16, MDD or MCAP file with all frames.
     faces : str or os.PathLike, optional
-        The faces of a format that has none (NPY, PC2, MDD): a mesh file, or integers (F, 3) in NPY or NPZ.
+        The faces of a format that has none (NPY, PC2, PC16, MDD): a mesh file, or integers (F, 3) in NPY or NPZ.
     split : bool
         Connected components of each mesh become meshes of their own.
 
@@ -63,7 +60,7 @@ def open_sequence(
       holes, subdivision, other prims. Rejected: skeletons and blend shapes that are not baked.
     - glTF, GLB: nodes of the default scene at the key times of all animations, with morph targets and skins. Vertices
       that coincide in all frames, as at seams of textures, are joined. Rejected: Draco and meshopt.
-    - PC2, MDD: positions of one mesh.
+    - PC2, PC16 (PC2 in float16), MDD: positions of one mesh.
     - MCAP: recordings of the ROS node whose meshes all come from MeshVertices in one coordinate frame. Frames are
       joined by their stamps.
 
@@ -104,16 +101,15 @@ def _opened(names: list[str], source: str, faces: Path | None) -> FrameSequence:
         whole = next(file for file in files if file.suffix.lower() not in SUFFIXES)
         raise SequenceError(f"{shortened(whole)}: is a whole sequence; give it alone")
     suffix = suffixes.pop()
-    match suffix:
-        case ".npz" | ".npy":
-            return ArrayFile(files[0], faces)
-        case ".pc2" | ".mdd":
-            return PointCache(files[0], faces)
+    if suffix in arrays.SUFFIXES:
+        return arrays.ArrayFile(files[0], faces)
+    if suffix in point_caches.SUFFIXES:
+        return point_caches.PointCache(files[0], faces)
     if faces is not None:
         raise SequenceError(f"{source}: has faces of its own; leave out faces (--faces)")
-    if suffix == ".mcap":
-        return Recording(files[0])
-    return usd.UsdStage(files[0]) if suffix in usd.SUFFIXES else gltf.GltfScene(files[0])
+    if suffix in usd.SUFFIXES:
+        return usd.UsdStage(files[0])
+    return gltf.GltfScene(files[0]) if suffix in gltf.SUFFIXES else recording.Recording(files[0])
 
 
 def _files(names: list[str]) -> list[Path]:

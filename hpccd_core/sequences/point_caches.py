@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Point caches of one mesh: PC2 and MDD. Their faces come from another file."""
+"""Point caches of one mesh: PC2, PC16 and MDD. Their faces come from another file."""
 
 import os
 import struct
@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from .sequence import FrameSequence, SequenceError, SequenceMesh
 from .topology import faces_of_file
 
+SUFFIXES = (".pc2", ".pc16", ".mdd")
 _PC2 = struct.Struct("<12siiffi")  # signature, version, vertices, first frame, frames a sample, samples
 _MDD = struct.Struct(">ii")  # frames, vertices; times in seconds follow
 
 
 class PointCache(FrameSequence):
-    """A PC2 or MDD file, by its suffix.
+    """A PC2, PC16 (the same in float16, as in CLOTH3D) or MDD file, by its suffix.
 
     Parameters
     ----------
@@ -30,20 +31,22 @@ class PointCache(FrameSequence):
         size = os.stat(path).st_size
         with open(path, "rb") as file:
             head = file.read(_PC2.size)
-        if path.suffix.lower() == ".pc2":
+        suffix = path.suffix.lower()
+        if suffix != ".mdd":
             n_frames, n_vertices = _pc2_header(path, head)
-            self._begin, self._dtype = _PC2.size, np.dtype("<f4")
+            self._begin, self._dtype = _PC2.size, np.dtype("<f4" if suffix == ".pc2" else "<f2")
         else:
             n_frames, n_vertices = _mdd_header(path, head)
             self._begin, self._dtype = _MDD.size + 4 * n_frames, np.dtype(">f4")
-        self._path, self._n_vertices = path, n_vertices
+        self._path = path
         if n_frames < 0 or n_vertices < 1:
             raise SequenceError(f"{path}: declares {n_frames} frames of {n_vertices} vertices; export it again")
-        expected = self._begin + n_frames * n_vertices * 12
+        self._size = n_vertices * 3 * self._dtype.itemsize  # bytes of a frame
+        expected = self._begin + n_frames * self._size
         if size != expected:
             problem = "is cut off" if size < expected else "is too long"
             raise SequenceError(f"{path}: {problem}: it has {size} of {expected} bytes; copy or export it again")
-        super().__init__(str(path), n_frames, ("positions are float32",))
+        super().__init__(str(path), n_frames, (f"positions are {self._dtype.newbyteorder('=')}",))
         if faces is None:
             raise SequenceError(f"{path}: has no faces; give the mesh file that belongs to it (--faces FILE)")
         self._meshes = (SequenceMesh(path.stem, faces_of_file(faces, n_vertices), n_vertices),)
@@ -51,9 +54,8 @@ class PointCache(FrameSequence):
     def _read(self, index: int) -> tuple[str, tuple[SequenceMesh, ...], NDArray[np.float64]]:
         if "file" not in self._opened:
             self._opened["file"] = open(self._path, "rb")
-        size = self._n_vertices * 12
-        self._opened["file"].seek(self._begin + index * size)
-        positions = np.frombuffer(self._opened["file"].read(size), self._dtype).reshape(-1, 3)
+        self._opened["file"].seek(self._begin + index * self._size)
+        positions = np.frombuffer(self._opened["file"].read(self._size), self._dtype).reshape(-1, 3)
         return f"{self._path.name}[{index}]", self._meshes, positions.astype(np.float64)
 
 

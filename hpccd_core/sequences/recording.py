@@ -17,6 +17,7 @@ from .packages import needed
 from .sequence import FrameSequence, SequenceError, SequenceMesh
 from .topology import checked_faces, same_or
 
+SUFFIXES = (".mcap",)
 _TOPOLOGY, _VERTICES = "hpccd/msg/MeshTopology", "hpccd/msg/MeshVertices"
 _REPLAY = "use hpccd replay"
 # Last parts of topics from which the node makes meshes, too.

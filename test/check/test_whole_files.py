@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Arrays, point caches and recordings as sequences."""
 
+import struct
+
 import malformed
 import numpy as np
 import planted
@@ -87,6 +89,19 @@ def test_memory_is_that_of_a_frame(save, suffix, tmp_path, monkeypatch):
     finally:
         tracemalloc.stop()
     assert peak < 600_000
+
+
+@pytest.mark.parametrize("suffix, dtype", [("pc2", "<f4"), ("pc16", "<f2"), ("mdd", ">f4")])
+def test_point_caches(suffix, dtype, tmp_path):
+    stack = STACK.astype(dtype)
+    pc2 = struct.pack("<12siiffi", b"POINTCACHE2\0", 1, 4, 0, 1, 5)
+    head = pc2 if suffix != "mdd" else struct.pack(">ii5f", 5, 4, *range(5))
+    (tmp_path / f"a.{suffix}").write_bytes(head + stack.tobytes())
+    (tmp_path / "mesh.obj").write_text(malformed.SQUARE)
+    sequence = open_sequence(tmp_path / f"a.{suffix}", faces=tmp_path / "mesh.obj")
+    assert np.array_equal(frames(sequence, [3, 0, 1, 2, 4]), stack[[3, 0, 1, 2, 4]].astype(np.float64))
+    assert sequence.notes == (f"positions are {np.dtype(dtype).newbyteorder('=')}",)
+    assert sequence.frame(4).name == f"a.{suffix}[4]" and sequence.frame(0).meshes[0].faces.tolist() == FACES.tolist()
 
 
 def test_a_recording_of_the_node():
