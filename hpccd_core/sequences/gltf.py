@@ -47,7 +47,7 @@ class GltfScene(FrameSequence):
             notes.append(f"{joined} vertices coincide with another one in all frames and are joined with it")
         if "EXT_mesh_gpu_instancing" in file.json.get("extensionsUsed", []):
             notes.append("instances (EXT_mesh_gpu_instancing) are left out")
-        super().__init__(str(path), max(1, len(self._times)), tuple(notes))
+        super().__init__(str(path), max(1, len(self._times)), tuple(notes), up="y")
 
     def _file(self) -> GltfFile:
         if "file" not in self._opened:

@@ -76,6 +76,8 @@ class FrameSequence(ABC):
         Sentences for a report: units, transforms, gaps, number formats.
     gaps : dict of int to int
         The number of frames that are missing right before a frame, for frames where some are.
+    up : {"x", "y", "z"} or None
+        The axis that points up, if the file says so.
 
     Raises
     ------
@@ -86,7 +88,12 @@ class FrameSequence(ABC):
     _of_process: tuple[int, dict[str, Any]] = (0, {})
 
     def __init__(
-        self, source: str, n_frames: int, notes: tuple[str, ...] = (), gaps: dict[int, int] | None = None
+        self,
+        source: str,
+        n_frames: int,
+        notes: tuple[str, ...] = (),
+        gaps: dict[int, int] | None = None,
+        up: str | None = None,
     ) -> None:
         if n_frames < 1:
             raise SequenceError(f"{source}: has no frames; export it again")
@@ -94,6 +101,7 @@ class FrameSequence(ABC):
         self.n_frames = n_frames
         self.notes = notes
         self.gaps = gaps or {}
+        self.up = up
 
     def __len__(self) -> int:
         return self.n_frames

@@ -42,8 +42,9 @@ class UsdStage(FrameSequence):
         origin = "" if geom.StageHasAuthoredMetersPerUnit(stage) else " (the default of USD: the file states none)"
         scaled = ", positions are scaled to metres" if self._unit != 1 else ""
         notes = [f"units: 1 unit = {self._unit:g} m{origin}{scaled}", *notes]
-        notes.insert(1, f"the {geom.GetStageUpAxis(stage)} axis points up; transforms of the stage are applied")
-        super().__init__(str(path), max(1, len(self._times)), tuple(notes))
+        up = str(geom.GetStageUpAxis(stage))
+        notes.insert(1, f"the {up} axis points up; transforms of the stage are applied")
+        super().__init__(str(path), max(1, len(self._times)), tuple(notes), up=up.lower())
 
     def _module(self, name: str) -> Any:
         return needed(f"pxr.{name}", "usd-core", self._path)

@@ -82,6 +82,7 @@ def test_positions_are_in_metres(unit, tmp_path):
     stage.Save()
     sequence, (frame,) = frames(tmp_path / "a.usda")
     assert frame.vertices[1].tolist() == [3 * unit, 0, 0]
+    assert sequence.up == "z" == open_sequence(tmp_path / "a.usda", split=True).up
     assert sequence.notes == (
         f"units: 1 unit = {unit:g} m, positions are scaled to metres",
         "the Z axis points up; transforms of the stage are applied",
