@@ -91,8 +91,10 @@ def test_several_meshes_a_frame(tmp_path):
 def test_files_without_common_names_are_one_frame(tmp_path):
     write(tmp_path, "cloth.obj", "body.obj")
     sequence = open_sequence([tmp_path / "cloth.obj", tmp_path / "body.obj"])
-    assert len(sequence) == 1 and sequence.notes == (
-        "no two files differ in their frame number only: the 2 files are meshes of one frame",
+    assert (
+        len(sequence) == 1
+        and sequence.up is None
+        and sequence.notes == ("no two files differ in their frame number only: the 2 files are meshes of one frame",)
     )
 
 
