@@ -68,7 +68,7 @@ class MeshFolder(FrameSequence):
 
     def __init__(self, files: list[Path], source: str) -> None:
         numbered = arrange(files)
-        self._files = numbered.meshes
+        self._files, self._names = numbered.meshes, numbered.names
         super().__init__(source, numbered.n_frames, numbered.notes, numbered.gaps)
 
     def _read(self, index: int) -> tuple[str, tuple[SequenceMesh, ...], NDArray[np.float64]]:
@@ -78,8 +78,8 @@ class MeshFolder(FrameSequence):
         last = self._opened.get("meshes", ())
         if len(last) != len(meshes) or any(a is not b for a, b in zip(meshes, last, strict=True)):
             self._opened["meshes"] = last = meshes
-        moving = [file.name for file, of_mesh in zip(files, self._files.values(), strict=True) if len(of_mesh) > 1]
-        return ", ".join(moving or [file.name for file in files]), last, np.concatenate([v for _, v in pairs])
+        moving = [file for file, of_mesh in zip(files, self._files.values(), strict=True) if len(of_mesh) > 1]
+        return ", ".join(self._names[file] for file in moving or files), last, np.concatenate([v for _, v in pairs])
 
     def _mesh(self, name: str, path: Path) -> tuple[SequenceMesh, NDArray[np.float64]]:
         """A mesh, the same object as in the frame before if its topology is the same, and its positions.

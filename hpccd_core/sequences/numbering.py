@@ -27,16 +27,22 @@ class Numbered:
         The number of frames that are missing right before a frame.
     notes : tuple of str
         Sentences about gaps and static meshes.
+    names : dict of Path to str
+        Of each file, its name relative to the folder that contains all files.
     """
 
     meshes: dict[str, list[Path]]
     n_frames: int
     gaps: dict[int, int]
     notes: tuple[str, ...]
+    names: dict[Path, str]
 
 
 def arrange(files: list[Path]) -> Numbered:
-    """Sort files into meshes and frames. The last digits in a name are the frame number, the rest is the mesh.
+    """Sort files into meshes and frames.
+
+    Of names that differ in numbers only, the number with the most values is that of the frame, and the last one of
+    several such. The rest of a name is the mesh.
 
     Raises
     ------
@@ -44,8 +50,9 @@ def arrange(files: list[Path]) -> Numbered:
         Two files have the same number, or meshes have different frames.
     """
     found: dict[tuple[str, str], dict[int, Path]] = {}
-    for file, name in zip(files, _relative(files), strict=True):
-        prefix, number, suffix = _parts(name)
+    names = dict(zip(files, _relative(files), strict=True))
+    parts = _parts([name.removesuffix(file.suffix) for file, name in names.items()])
+    for file, (prefix, number, suffix) in zip(names, parts, strict=True):
         of_mesh = found.setdefault((prefix, suffix), {})
         if number in of_mesh:
             raise SequenceError(
@@ -57,26 +64,37 @@ def arrange(files: list[Path]) -> Numbered:
     notes = []
     if len(numbers) > 1:
         static = [name for name, of_mesh in meshes.items() if len(of_mesh) == 1]
-        notes += [f"{meshes[name][0].name} is one file: its mesh is the same in all frames" for name in static]
+        notes += [f"{names[meshes[name][0]]} is one file: its mesh is the same in all frames" for name in static]
     elif len(files) > 1:
         notes.append(f"no two files differ in their frame number only: the {len(files)} files are meshes of one frame")
     moving = next((of_mesh for of_mesh in meshes.values() if len(of_mesh) > 1), [])
-    gaps, of_gaps = gaps_between(numbers, [file.name for file in moving])
-    return Numbered(meshes, max(1, len(numbers)), gaps, (*notes, *of_gaps))
+    gaps, of_gaps = gaps_between(numbers, [names[file] for file in moving])
+    return Numbered(meshes, max(1, len(numbers)), gaps, (*notes, *of_gaps), names)
 
 
 def _relative(files: list[Path]) -> list[str]:
-    """Names without suffix, relative to the folder that contains all files."""
+    """Names of files, relative to the folder that contains all of them."""
     if len({file.parent for file in files}) == 1:
-        return [file.stem for file in files]
+        return [file.name for file in files]
     common = os.path.commonpath([file.absolute().parent for file in files])
-    return [file.absolute().relative_to(common).with_suffix("").as_posix() for file in files]
+    return [file.absolute().relative_to(common).as_posix() for file in files]
 
 
-def _parts(name: str) -> tuple[str, int, str]:
-    """(text before the last digits, their number, text after them); without digits the number is 0."""
-    match = re.fullmatch(r"(.*?)([0-9]+)([^0-9]*)", name, re.DOTALL)
-    return (match[1], int(match[2]), match[3]) if match else (name, 0, "")
+def _parts(names: list[str]) -> list[tuple[str, int, str]]:
+    """(text before the frame number, that number, text after it) of each name; without digits the number is 0."""
+    pieces = [re.split("([0-9]+)", name) for name in names]  # text, digits, text, ...
+    alike: dict[tuple[str, ...], list[list[str]]] = {}
+    for split in pieces:
+        alike.setdefault(tuple(split[::2]), []).append(split)
+    place = {
+        texts: max(range(1, len(of[0]), 2), key=lambda k: (len({int(split[k]) for split in of}), k), default=0)
+        for texts, of in alike.items()
+    }
+    found = []
+    for name, split in zip(names, pieces, strict=True):
+        k = place[tuple(split[::2])]
+        found.append(("".join(split[:k]), int(split[k]), "".join(split[k + 1 :])) if k else (name, 0, ""))
+    return found
 
 
 def _common_numbers(found: dict[tuple[str, str], dict[int, Path]]) -> list[int]:

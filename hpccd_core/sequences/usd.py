@@ -147,7 +147,7 @@ class UsdStage(FrameSequence):
                 points = sum((points[:, k, None] * matrix[k, :3] for k in range(3)), matrix[3, :3])
             positions.append(points * self._unit if self._unit != 1 else points)
         self._opened["meshes"] = same = same_or(self._opened.get("meshes"), tuple(meshes))
-        label = f"{self._path.name} @ {self._times[index]:g}" if self._times else self._path.name
+        label = f"{self._path.name} @ {self._times[index]:.12g}" if self._times else self._path.name
         return label, same, np.concatenate(positions)
 
     def _points(self, mesh: Any, time: Any) -> NDArray[np.float64]:

@@ -33,6 +33,7 @@ def names_of(sequence):
         ["f.0008.obj", "f.0009.obj", "f.0010.obj", "f.0011.obj"],
         ["9_cloth.obj", "10_cloth.obj", "11_cloth.obj"],
         ["7.obj", "8.obj", "12.obj"],
+        ["frame_0009_v2.obj", "frame_0010_v2.obj", "frame_0011_v2.obj"],
         ["run2_f9.obj", "run2_f10.obj", "run2_f11.obj"],
         ["A1.OBJ", "A2.OBJ"],
     ],
@@ -44,6 +45,14 @@ def test_frames_are_in_the_order_of_their_numbers(names, tmp_path):
     random.Random(1).shuffle(shuffled)
     assert names_of(open_sequence(shuffled)) == names
     assert names_of(open_sequence(f"{tmp_path}/*.[oO][bB][jJ]")) == names
+
+
+@pytest.mark.parametrize("form", ["frame{0}_part{1}.obj", "part{1}_frame{0}.obj", "part{1}.{0}.obj", "{0}/part{1}.obj"])
+def test_numbered_meshes(form, tmp_path):
+    write(tmp_path, *(form.format(frame, part) for frame in (8, 9, 10) for part in (1, 2)))
+    sequence = open_sequence(f"{tmp_path}/*/*.obj" if "/" in form else tmp_path)
+    assert len(sequence) == 3
+    assert names_of(sequence) == [", ".join(form.format(frame, part) for part in (1, 2)) for frame in (8, 9, 10)]
 
 
 def test_one_folder_a_frame(tmp_path):
