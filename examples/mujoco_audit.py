@@ -28,7 +28,7 @@ from hpccd_core.mujoco import MujocoScene
 from hpccd_core.picture.contacts import Picture, draw
 
 HERE = Path(__file__).resolve().parent / "mujoco"
-STEPS = {"mattress": 300, "rope": 200, "drape": 250}
+STEPS = {"drape": 250, "fold": 200, "mattress": 300, "rope": 200}
 SWEEP = 1.0  # radians per second of the first actuator
 CAPS_ALL = tuple(map(int, mujoco.__version__.split(".")[:2])) < (3, 16)
 ROUND = (mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE)

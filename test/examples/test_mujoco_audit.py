@@ -52,6 +52,12 @@ def test_balls_pass_through_cloth(tmp_path):
     assert done.returncode == 0 and row["passed through"] > 20 and row["decided"] == row["for hpccd"]
 
 
+def test_self_contacts_are_compared(tmp_path):
+    done = run(tmp_path, *models("fold"), "--steps", "90", "--json", "a.json")
+    (row,) = json.loads((tmp_path / "a.json").read_text())["models"]
+    assert done.returncode == 0 and row["both"] > 3000 and row["decided"] == row["for hpccd"]
+
+
 def test_a_model_with_a_robot_is_left_out_without_one(tmp_path):
     robot = tmp_path / "stick.xml"
     robot.write_text(
