@@ -1,21 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """A sequence of frames: what all readers return."""
 
+from __future__ import annotations
+
 import contextlib
 import os
 import struct
+import threading
+import uuid
 import zipfile
 import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import LARGEST_COORDINATE
 from ..mesh_files.errors import MeshFileError, shortened
+
+if TYPE_CHECKING:
+    from typing import Self
 
 
 class SequenceError(MeshFileError):
@@ -85,7 +92,13 @@ class FrameSequence(ABC):
         There are no frames.
     """
 
-    _of_process: tuple[int, dict[str, Any]] = (0, {})
+    _key: str
+    _of_thread: tuple[tuple[int, int], dict[str, Any]] = ((0, 0), {})
+
+    def __new__(cls, *_: Any, **__: Any) -> Self:
+        made = super().__new__(cls)
+        made._key = uuid.uuid4().hex  # kept by pickle
+        return made
 
     def __init__(
         self,
@@ -107,14 +120,15 @@ class FrameSequence(ABC):
         return self.n_frames
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_of_process": (0, {})}
+        return {name: value for name, value in self.__dict__.items() if name != "_of_thread"}
 
     @property
     def _opened(self) -> dict[str, Any]:
-        """Open files and the last topology. A child process opens its own: it would share the position in a file."""
-        if self._of_process[0] != os.getpid():
-            self._of_process = os.getpid(), {}
-        return self._of_process[1]
+        """Open files and the last topology, of this thread: a child process would share the position in a file."""
+        owner = os.getpid(), threading.get_ident()
+        if self._of_thread[0] != owner:
+            self._of_thread = owner, _shared((*owner, self._key))
+        return self._of_thread[1]
 
     def frame(self, index: int) -> Frame:
         """Read one frame. Forward order is the cheapest.
@@ -146,6 +160,20 @@ class FrameSequence(ABC):
     @abstractmethod
     def _read(self, index: int) -> tuple[str, tuple[SequenceMesh, ...], NDArray[np.float64]]:
         """(name, meshes, vertices) of a frame."""
+
+
+# Workers of a pool get a new copy of a sequence with each part: the last ones keep their files open.
+_MOST_OPEN = 4
+_of_copies = threading.local()
+
+
+def _shared(key: tuple[int, int, str]) -> dict[str, Any]:
+    """What all copies of a sequence have opened in this thread."""
+    states: dict[tuple[int, int, str], dict[str, Any]] = _of_copies.__dict__.setdefault("states", {})
+    states[key] = states.pop(key, {})
+    while len(states) > _MOST_OPEN:
+        del states[next(iter(states))]
+    return states[key]
 
 
 @contextlib.contextmanager

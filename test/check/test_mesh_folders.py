@@ -4,6 +4,7 @@
 import multiprocessing
 import pickle
 import random
+from concurrent.futures import ThreadPoolExecutor
 
 import malformed
 import numpy as np
@@ -259,6 +260,23 @@ def test_sequences_go_to_other_processes(tmp_path):
     # A forked process must not share the position in the file.
     with multiprocessing.get_context("fork").Pool(2) as pool:
         assert pool.map(read_second, [sequence] * 8) == [stack[1].tobytes()] * 8
+
+
+def test_copies_share_what_they_have_opened(tmp_path):
+    write(tmp_path, "f1.obj", "f2.obj")
+    other = open_sequence(tmp_path)
+    copies = [pickle.dumps(open_sequence(tmp_path))] * 3
+    meshes = [pickle.loads(copy).frame(k % 2).meshes for k, copy in enumerate(copies)]
+    assert meshes[0] is meshes[1] is meshes[2] and meshes[0] is not other.frame(0).meshes
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(lambda: pickle.loads(copies[0]).frame(0).meshes).result() is not meshes[0]
+
+
+def test_many_sequences_at_once_keep_their_topology(tmp_path):
+    write(tmp_path, "f1.obj", "f2.obj")
+    sequences = [open_sequence(tmp_path, split=True) for _ in range(9)]
+    first = [sequence.frame(0).meshes for sequence in sequences]
+    assert all(sequence.frame(1).meshes is meshes for sequence, meshes in zip(sequences, first, strict=True))
 
 
 def test_frames_beyond_the_end_are_an_index_error(tmp_path):
