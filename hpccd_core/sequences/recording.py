@@ -53,9 +53,8 @@ class Recording(FrameSequence):
         notes = [f"positions are in the coordinate frame {shortened(frame_id) or '(no name)'}"]
         if left_out := len(set().union(*frames)) - len(self._stamps):
             notes.append(f"{left_out} stamps are left out: not all meshes have a frame with them")
-        notes += [
-            f"{name} has one message: its mesh is the same in all frames" for name in self._meshes.keys() - moving
-        ]
+        static = [name for name in self._meshes if moving and name not in moving]
+        notes += [f"{name} has one message: its mesh is the same in all frames" for name in static]
         steps = [frames[0][stamp][2] for stamp in self._stamps]
         gaps, of_gaps = gaps_between(steps, [self._label(stamp) for stamp in self._stamps])
         super().__init__(str(path), len(self._stamps), (*notes, *of_gaps), gaps)

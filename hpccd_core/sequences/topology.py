@@ -101,6 +101,8 @@ def same_or(last: tuple[SequenceMesh, ...] | None, meshes: tuple[SequenceMesh, .
     if last is None or len(last) != len(meshes):
         return meshes
     for a, b in zip(last, meshes, strict=True):
+        if a is b:
+            continue
         if (a.name, a.n_vertices) != (b.name, b.n_vertices) or not np.array_equal(a.faces, b.faces):
             return meshes
     return last

@@ -135,6 +135,15 @@ def test_a_recording_has_the_frames_that_the_node_computed():
     assert [detector.detect(a, b).hash for a, b in zip(ordered, ordered[1:], strict=False)] == hashes
 
 
+def test_meshes_with_one_message_are_static(tmp_path):
+    pytest.importorskip("mcap_ros2", reason="recordings need the extra check")
+    planted.write_recording(tmp_path / "a.mcap", {name: of[:3] for name, of in planted.positions([]).items()})
+    note = "body has one message: its mesh is the same in all frames"
+    assert open_sequence(tmp_path / "a.mcap").notes == ("positions are in the coordinate frame world", note)
+    planted.write_recording(tmp_path / "b.mcap", {name: of[:1] for name, of in planted.positions([]).items()})
+    assert open_sequence(tmp_path / "b.mcap").notes == ("positions are in the coordinate frame world",)
+
+
 def test_gaps_of_a_recording_are_those_of_its_steps(tmp_path):
     pytest.importorskip("mcap_ros2", reason="recordings need the extra check")
     shape = {name: planted.positions([])[name][:4] for name in ("cloth", "probe")}
