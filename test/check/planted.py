@@ -255,7 +255,8 @@ def write_mcap(folder, shape):
     return [folder / "planted.mcap"], {}
 
 
-def write_recording(path, shape, frame_ids=("world",), steps=None, version=0, edges=(), backwards=False):
+def write_recording(path, shape, frame_ids=("world",), steps=None, version=0, edges=(), backwards=False, second=None):
+    """second: (frame, mesh): from then on, the mesh has only its first face."""
     from mcap_ros2.writer import Writer
 
     with open(path, "wb") as file:
@@ -274,7 +275,12 @@ def write_recording(path, shape, frame_ids=("world",), steps=None, version=0, ed
             for n, (name, of_mesh) in enumerate(shape.items()):
                 if name == STATIC and k:
                     continue
-                message = {"topology_version": 0, "step": k if steps is None else steps[k]}
+                if second == (k, name):
+                    message = {"version": 1, "n_vertices": of_mesh.shape[1], "faces": faces()[name][0].tolist()}
+                    message = _stamped(at, "", message | {"edges": []})
+                    writer.write_message(f"/meshes/{name}/topology", topology, message, 1000 * k + n, 0)
+                of_version = int(second is not None and second[1] == name and second[0] <= k)
+                message = {"topology_version": of_version, "step": k if steps is None else steps[k]}
                 message |= {"vertices_f32": of_mesh[k].reshape(-1).tolist(), "vertices_f64": []}
                 message = _stamped(at, frame_ids[n % len(frame_ids)], message)
                 writer.write_message(f"/meshes/{name}/vertices", vertices, message, 1000 * k + n + 10, 0)

@@ -144,6 +144,17 @@ def test_meshes_with_one_message_are_static(tmp_path):
     assert open_sequence(tmp_path / "b.mcap").notes == ("positions are in the coordinate frame world",)
 
 
+def test_a_topology_that_changes_in_a_recording(tmp_path):
+    pytest.importorskip("mcap_ros2", reason="recordings need the extra check")
+    shape = {name: planted.positions([])[name][:4] for name in ("cloth", "probe")}
+    planted.write_recording(tmp_path / "a.mcap", shape, second=(2, "probe"))
+    sequence = open_sequence(tmp_path / "a.mcap")
+    for order in (range(4), (3, 0, 2, 1)):
+        found = {k: sequence.frame(k) for k in order}
+        assert [len(found[k].meshes[1].faces) for k in range(4)] == [4, 4, 1, 1]
+    assert found[2].meshes is not found[1].meshes and np.array_equal(frames(sequence)[:, 49:], shape["probe"])
+
+
 def test_gaps_of_a_recording_are_those_of_its_steps(tmp_path):
     pytest.importorskip("mcap_ros2", reason="recordings need the extra check")
     shape = {name: planted.positions([])[name][:4] for name in ("cloth", "probe")}
