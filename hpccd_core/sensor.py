@@ -150,8 +150,9 @@ class ContactSensor:
         )
         if isinstance(self._members, np.ndarray):
             self._members = torch.from_numpy(self._members).to(vf.device)
-        number = torch.arange(self.detector.worlds or 1, device=vf.device)
-        world = torch.cat([number.repeat_interleave(begin.diff()) for begin in begins])
+        rows = [torch.arange(len(values), device=vf.device) for values in (vf, ee)]
+        # Not repeat_interleave, which makes the host wait for the device.
+        world = torch.cat([torch.searchsorted(b, r, right=True) - 1 for b, r in zip(begins, rows, strict=True)])
         is_vf = torch.arange(len(world), device=vf.device) < len(vf)
         return torch, torch.cat([vf, ee]), weighted.view(torch.int32).long(), normals, world, is_vf
 
@@ -168,8 +169,8 @@ class ContactSensor:
         group, pair = group[order], pair[order]
         counts = xp.bincount(cell, minlength=worlds * groups)
         last = xp.cumsum(counts, 0)
-        some = counts > 0
-        nearest = (last - counts)[some]
+        (some,) = xp.where(counts > 0)
+        nearest = last[some] - counts[some]
         terms = xp.clip(1 - distance[pair] / self.max_distance, 0, None) / _UNIT
         sums = xp.cumsum(xp.asarray(xp.round(terms), dtype=xp.int64), 0)
         distances = xp.full_like(counts, np.inf, dtype=xp.float64)

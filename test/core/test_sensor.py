@@ -3,6 +3,7 @@
 
 import itertools
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -132,11 +133,10 @@ def test_tensors_give_the_same_numbers():
     sensor = ContactSensor(detector, GROUPS, REACH)
     on_host = sensor.read(frames)
     near = detector.proximity(frames, REACH)
-    vertices = torch.from_numpy(near.vertices.astype(np.int64))
-    others = (near._values("distance"), near.normals, near._worlds_of_rows(), np.arange(len(near)) < len(near.vf))
-    distance, normals, world, one_a = map(torch.from_numpy, others)
-    sensor._members = torch.from_numpy(sensor._members)
-    found = sensor._of_pairs(torch, distance, vertices, normals, world, one_a)
+    names = ("vf_distance", "ee_distance", "normals", "vertices", "vf_offsets", "ee_offsets")
+    tensors = SimpleNamespace(**{name: torch.from_numpy(getattr(near, name)) for name in names})
+    sensor._torch = torch
+    found = sensor._of_pairs(*sensor._on_device(tensors))
     for name in ("counts", "distances", "normals", "pressures"):
         tensor = getattr(found, name)
         assert tensor.numpy().dtype == getattr(on_host, name).dtype
