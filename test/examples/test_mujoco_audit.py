@@ -72,6 +72,14 @@ def test_a_model_with_a_robot_is_left_out_without_one(tmp_path):
     assert without is None
 
 
+def test_a_model_that_cannot_be_loaded_is_named(tmp_path):
+    (tmp_path / "bad.xml").write_text("<mujoco><worldbody><geom/></worldbody></mujoco>")
+    for name, reason in ("bad.xml", "size 0 must be positive"), ("none.xml", "none.xml"):
+        done = run(tmp_path, "--model", name)
+        assert done.returncode == 2 and "Traceback" not in done.stderr
+        assert f"{name}: MuJoCo {mujoco.__version__} cannot load it: " in done.stderr and reason in done.stderr
+
+
 def fallen(steps):
     audit = mujoco_audit.Audit("mattress", mujoco.MjModel.from_xml_path(str(MODELS / "mattress.xml")))
     for _ in range(steps):
