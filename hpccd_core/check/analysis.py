@@ -94,14 +94,22 @@ class Checker:
         self._last = State(frame, scene, scene.positions(frame), motion, distance)
         return self._last
 
-    def frame(self, state: State) -> FrameResult:
-        """What is wrong in a frame."""
+    def frame(self, state: State, step: StepResult | None = None) -> FrameResult:
+        """What is wrong in a frame. step: to the next one; if it has no contact, the frame has none either."""
         gaps = state.distance.distances(state.x)
         smallest = min((gap.distance for gap in gaps), default=np.inf)
         inside = [pair for gap in gaps for pair in _inside(gap)]
         count = len(state.motion.intersections(state.x))
+        near = False
+        is_free = step is not None and step.contacts == 0
+        if len(state.frame.meshes) > 1 and not is_free and (self._options.separation or not count):
+            contacts = state.motion.detect(state.x, state.x)  # exact; distances are rounded
+            apart = contacts.mesh_a != contacts.mesh_b
+            near = bool(apart.any())
+            if not (count or apart.all()):
+                smallest = 0.0
         distance = float(smallest) if np.isfinite(smallest) else None
-        return FrameResult(state.frame.index, state.frame.name, count, distance, tuple(inside))
+        return FrameResult(state.frame.index, state.frame.name, count, distance, tuple(inside), near)
 
     def step(self, start: State, end: State) -> tuple[StepResult, Contacts | None]:
         """What touches in the step between two frames, and the contacts; None where the meshes changed."""
@@ -140,12 +148,10 @@ def check_part(
     """
     checker = Checker(sequence, options, threads)
     for index in range(begin, end):
-        state = checker.state(index)
-        result = checker.frame(state)
-        if index + 1 == len(sequence):
-            yield result, None
-        else:
-            yield result, checker.step(state, checker.state(index + 1))[0]
+        state, step = checker.state(index), None
+        if index + 1 < len(sequence):
+            step = checker.step(state, checker.state(index + 1))[0]
+        yield checker.frame(state, step), step
 
 
 def _inside(gap: Gap) -> list[tuple[str, str]]:

@@ -242,7 +242,7 @@ def _shown(n_vertices: int, report: Report) -> list[int]:
     """Numbers of the frames of a page: the first and the last, those with defects, then others at even distances."""
     count = len(report.frames)
     most = max(2, min(count, MOST_FRAMES, MOST_POSITIONS // (6 * max(n_vertices, 1))))
-    defects = {frame.index for frame in report.frames if frame.has_defect(report.separation)}
+    defects = {frame.index for frame in report.frames if frame.has_defect}
     bad = sorted(defects | {step.end for step in report.steps if step.contacts != 0})
     chosen = dict.fromkeys([worst(report), 0, count - 1])
     for indices in (bad, range(count)):

@@ -43,27 +43,28 @@ class FrameScene:
         first, kept = 0, []
         joined: list[NDArray[np.intp]] = []
         for mesh in meshes:
-            faces: NDArray[np.uint32] = mesh.faces
-            chosen = np.arange(mesh.n_vertices)
+            used, faces = _compact(mesh.faces)
             if welded is not None:
-                _, faces, index = weld(welded.vertices[first : first + mesh.n_vertices], faces)
-                chosen = np.unique(index, return_index=True)[1]
-                joined.append(first + chosen[index])
-            used, numbers = np.unique(faces, return_inverse=True)
-            faces = numbers.reshape(-1, 3).astype(np.uint32)
+                _, faces, index = weld(welded.vertices[first + used], faces)
+                if not len(faces):
+                    raise SequenceError(f"{welded.name}: {mesh.name} has no face with an area; check without --weld")
+                chosen = used[np.unique(index, return_index=True)[1]]
+                joined.append(first + np.stack([chosen[index], used]))
+                used, faces = _compact(faces)
+                used = chosen[used]
             self.faces.append(faces)
             self.counts.append(len(used))
             for scene in (self.scene, self.apart):
                 scene.add_mesh(mesh.name, faces, n_vertices=len(used))
             if len(meshes) > 1:
                 self.apart.ignore_pair(mesh.name, mesh.name)
-            kept.append(first + chosen[used])
+            kept.append(first + used)
             first += mesh.n_vertices
         if separation:
             for a, b in itertools.combinations([mesh.name for mesh in meshes], 2):
                 self.scene.set_separation(a, b, separation)
         self.kept = np.concatenate(kept)
-        self._joined = np.concatenate(joined) if joined else None
+        self._joined = np.concatenate(joined, axis=1) if joined else None
 
     def positions(self, frame: Frame) -> NDArray[np.float64]:
         """The vertices of the scene in a frame with the same meshes.
@@ -75,10 +76,17 @@ class FrameScene:
         """
         x = frame.vertices
         if self._joined is not None:
-            apart = np.flatnonzero((x != x[self._joined]).any(axis=1))
+            a, b = self._joined
+            apart = np.flatnonzero((x[a] != x[b]).any(axis=1))
             if len(apart):
                 raise SequenceError(
-                    f"{frame.name}: vertices {self._joined[apart[0]]} and {apart[0]}, at one position in the first "
-                    "frame, are apart here; check without --weld"
+                    f"{frame.name}: vertices {a[apart[0]]} and {b[apart[0]]}, at one position in the first frame, are "
+                    "apart here; check without --weld"
                 )
         return x[self.kept]
+
+
+def _compact(faces: NDArray[np.uint32]) -> tuple[NDArray[np.intp], NDArray[np.uint32]]:
+    """(the vertices that faces use, the faces as numbers of these)."""
+    used, numbers = np.unique(faces, return_inverse=True)
+    return used.astype(np.intp), numbers.reshape(-1, 3).astype(np.uint32)

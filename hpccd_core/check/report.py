@@ -24,9 +24,12 @@ class FrameResult:
         Pairs of an edge and a face that intersect.
     distance : float or None
         The smallest between different meshes, in the unit of the sequence; of a single mesh, between its features that
-        share no vertex. 0 if they touch, None if there is no such pair.
+        share no vertex. 0 if they touch, or if a mesh touches itself and nothing intersects, as where it is folded flat
+        along an edge. None if there is no such pair.
     inside : tuple of (str, str)
         Pairs of meshes: a connected component of the first lies inside the second, without touching it.
+    near : bool
+        Whether different meshes are within the separation; `distance` is rounded, this is exact.
     """
 
     index: int
@@ -34,10 +37,12 @@ class FrameResult:
     intersections: int
     distance: float | None
     inside: tuple[tuple[str, str], ...]
+    near: bool = False
 
-    def has_defect(self, separation: float = 0.0) -> bool:
+    @property
+    def has_defect(self) -> bool:
         """Whether surfaces touch, intersect or contain each other, or different meshes are within the separation."""
-        return bool(self.intersections or self.inside) or (self.distance is not None and self.distance <= separation)
+        return bool(self.intersections or self.inside or self.near or self.distance == 0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,11 +115,11 @@ class Report:
 
     def _defects(self) -> str:
         frames, steps = self._bad_frames(), self._bad_steps()
-        near = [frame for frame in frames if frame.distance is not None and 0 < frame.distance <= self.separation]
         counts = {
             "with intersections": sum(frame.intersections > 0 for frame in frames),
             "with a mesh inside another": sum(bool(frame.inside) for frame in frames),
-            f"closer than {self.separation:g}": len(near),
+            "where a mesh touches itself": sum(frame.distance == 0 and not frame.intersections for frame in frames),
+            f"closer than {self.separation:g}": sum(frame.near and frame.distance != 0 for frame in frames),
         }
         found = [f"{_of(count, self.frames, 'frame')} {what}" for what, count in counts.items() if count]
         if steps:
@@ -134,19 +139,19 @@ class Report:
         return [
             (frame, step)
             for frame, step in self.rows()
-            if frame.has_defect(self.separation) or (step is not None and step.contacts != 0)
+            if frame.has_defect or (step is not None and step.contacts != 0)
         ]
 
     def to_json(self) -> dict[str, object]:
         """As `hpccd-check --json` writes it: verdict, frames, steps, notes."""
-        frames = [
-            {**dataclasses.asdict(frame), "inside": [list(pair) for pair in frame.inside]} for frame in self.frames
-        ]
+        frames: list[dict[str, object]] = [dataclasses.asdict(frame) for frame in self.frames]
+        for frame in frames:
+            del frame["near"]
         steps = [dataclasses.asdict(step) for step in self.steps]
         return {"verdict": self.verdict, "frames": frames, "steps": steps, "notes": list(self.notes)}
 
     def _bad_frames(self) -> list[FrameResult]:
-        return [frame for frame in self.frames if frame.has_defect(self.separation)]
+        return [frame for frame in self.frames if frame.has_defect]
 
     def _bad_steps(self) -> list[StepResult]:
         return [step for step in self.steps if step.contacts]

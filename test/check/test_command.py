@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -158,6 +159,40 @@ def test_separation_counts_different_meshes(tmp_path):
     assert check(tmp_path / "two.npz", "--separation", 0.75) == 1
 
 
+def test_separation_leaves_out_distances_within_a_mesh(tmp_path):
+    square, faces = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0.0)]), np.array([(0, 1, 2), (0, 2, 3)])
+    np.savez(tmp_path / "one.npz", vertices=[square, square], faces=faces)
+    status, report = checked(tmp_path, tmp_path / "one.npz", "--separation", 2)
+    assert status == 0 and report["frames"][0]["distance"] == 0.5**0.5
+
+
+@pytest.mark.parametrize("n_frames", [1, 2])
+def test_the_separation_is_exact_where_a_distance_is_rounded(n_frames, tmp_path):
+    a, b = [(0, 0, 0), (-1, 0, 0), (0, -1, 0)], [(1, 1, 1), (2, 1, 1), (1, 2, 1)]
+    vertices = {"a_vertices": np.array([a] * n_frames, float), "b_vertices": np.array([b] * n_frames, float)}
+    np.savez(tmp_path / "two.npz", a_faces=[(0, 1, 2)], b_faces=[(0, 1, 2)], **vertices)
+    below = 1.7320508075688772  # the square root of 3, rounded down
+    assert Fraction(below) ** 2 < 3 < Fraction(np.nextafter(below, 2)) ** 2
+    status, report = checked(tmp_path, tmp_path / "two.npz", "--separation", repr(below))
+    assert status == 0 and report["frames"][0]["distance"] == below
+    assert check(tmp_path / "two.npz", "--separation", repr(float(np.nextafter(below, 2)))) == 1
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_a_flat_fold_touches_itself(beside, tmp_path, capsys):
+    """Two triangles of one edge, folded onto each other: no edge intersects a face that has no vertex of it."""
+    folded = {
+        "a_vertices": np.array([[(0, 0, 0), (4, 0, 0), (0, 4, 0), (1, 1, 0.0)]]),
+        "a_faces": [(0, 1, 2), (1, 0, 3)],
+    }
+    other = {"b_vertices": np.array([[(0, 0, 9), (1, 0, 9), (0, 1, 9.0)]]), "b_faces": [(0, 1, 2)]}
+    np.savez(tmp_path / "fold.npz", **folded, **(other if beside else {}))
+    status, report = checked(tmp_path, tmp_path / "fold.npz")
+    assert status == 1 and report["frames"][0]["distance"] == 0 and report["frames"][0]["intersections"] == 0
+    says = "defects: 1 of 1 frame where a mesh touches itself; first in frame 0 (fold.npz[0])"
+    assert capsys.readouterr().out.splitlines()[-1] == says
+
+
 def write_frames(folder, *meshes):
     """An OBJ file for each of (vertices, faces)."""
     for k, (vertices, faces) in enumerate(meshes):
@@ -191,6 +226,9 @@ def test_weld_joins_doubled_vertices(tmp_path, capsys):
     write_frames(folder, doubled, torn)
     assert check(folder, "--weld") == 2
     assert "vertices 1 and 3, at one position in the first frame, are apart here" in capsys.readouterr().err
+    loose = [*([(1, 0, z)] + doubled[0] for z in (0, 5))]  # a vertex in no face that moves away
+    faces = [tuple(k + 1 for k in face) for face in doubled[1]]
+    assert check(write_frames(folder, *((vertices, faces) for vertices in loose)), "--weld") == 0
 
 
 def test_several_sequences_in_one_command(npz, tmp_path, capsys):
