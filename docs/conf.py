@@ -39,7 +39,7 @@ copybutton_exclude = ".linenos, .gp, .go"
 
 # Python: numpydoc sections, and types by their short names.
 autodoc_typehints = "none"
-autodoc_mock_imports = ["jax", "torch", "warp"]  # extras
+autodoc_mock_imports = ["jax", "mujoco", "torch", "warp"]  # extras
 autodoc_member_order = "bysource"
 maximum_signature_line_length = 100
 autodoc_default_options = {"members": True}

@@ -133,9 +133,11 @@ class Audit:
         self.elements = [self._elements_at(flex) for flex in range(model.nflex)]
         mujoco.mj_forward(model, self.data)
         self.before = self.adapter.vertices(self.data)
-        shown = [k for k in range(model.ngeom) if model.geom_group[k] < 3 and model.geom_type[k] != 0]
-        self.visible = MujocoScene(model, geoms=shown, outputs=("points",))
-        self.seen = self.visible.vertices(self.data) if drawn else None
+        self.visible, self.seen = None, None
+        if drawn:
+            shown = [k for k in range(model.ngeom) if model.geom_group[k] < 3 and model.geom_type[k] != 0]
+            self.visible = MujocoScene(model, geoms=shown, outputs=("points",))
+            self.seen = self.visible.vertices(self.data)
         self.fullest: tuple[int, hc.Contacts, np.ndarray] | None = None
         self.known = self.pairs_of_mujoco() | set(self.pairs_at(self.before))
 

@@ -14,8 +14,8 @@ cylinder, ellipsoid    a closed mesh around the shape, at most `tolerance` large
 mesh                   its triangles, or with ``hulls=True`` the convex hull, which MuJoCo collides
 =====================  =============================================================================
 
-Only pairs that MuJoCo tests are tested: contype and conaffinity, excluded bodies, bodies that are welded or joined to
-each other, predefined pairs. The margins of a pair add up to its separation.
+The tested pairs are those of MuJoCo: it decides by contype and conaffinity, by excluded, welded and joined bodies, and
+by predefined pairs. The margins of a pair add up to its separation.
 
 During a step vertices move on straight lines. Where a geom rotates by the angle a, a vertex at the distance r from the
 axis is at most r (1 - cos(a / 2)) from its arc; :mod:`hpccd_core.rigid` has proven bounds. Surfaces are not solids:
