@@ -2,6 +2,8 @@
 """hpccd_core.mujoco beside MuJoCo: the same positions, names, surfaces, and pairs."""
 
 import itertools
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -272,6 +274,22 @@ def test_errors_name_the_remedy(attempt, kind, message):
     )
     with pytest.raises(kind, match=message):
         attempt(model)
+
+
+def test_without_mujoco_the_extra_is_named():
+    program = "import sys; sys.modules['mujoco'] = None; import hpccd_core.mujoco"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1 and "pip install 'hpccd-core[mujoco]'" in done.stderr.splitlines()[-1]
+
+
+def test_a_rotating_geom_leaves_its_arc_by_the_documented_distance():
+    model, data = load('<body> <joint axis="0 0 1"/> <geom type="box" size=".5 .1 .1"/> </body> <geom size=".1"/>')
+    adapter, angle, ends = MujocoScene(model), 0.3, []
+    for data.qpos[0] in (0.0, angle / 2, angle):
+        mujoco.mj_forward(model, data)
+        ends.append(adapter.vertices(data)[:8])
+    apart = np.linalg.norm(ends[1] - (ends[0] + ends[2]) / 2, axis=1).max()
+    assert apart == pytest.approx(np.hypot(0.5, 0.1) * (1 - np.cos(angle / 2)))
 
 
 def test_a_plane_that_moves_is_rejected():
