@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
+import logging
 import multiprocessing.connection
 import multiprocessing.synchronize
 import os
@@ -129,6 +131,7 @@ def cluster(distributed: Any, scheduler: str | None, jobs: int, most: int) -> It
     scheduler: the address of a running Dask cluster; without, processes of this machine are started. jobs: how many of
     them; 0: one for each core. most: no more than this are of use. Raises ClusterError.
     """
+    lost = (distributed.KilledWorker, distributed.CancelledError, distributed.comm.CommClosedError)
     if scheduler:
         try:
             client = distributed.Client(scheduler, timeout="60s")
@@ -137,18 +140,39 @@ def cluster(distributed: Any, scheduler: str | None, jobs: int, most: int) -> It
         with client:
             if not client.scheduler_info(n_workers=-1)["workers"]:
                 raise ClusterError(f"--scheduler {scheduler}: a cluster without workers: start some (dask worker)")
-            yield client, 0
+            try:
+                yield client, 0
+            except lost as error:
+                raise ClusterError(
+                    f"--scheduler {scheduler}: its workers were lost, perhaps for lack of memory: {error}; start more"
+                ) from error
         return
     cores = len(os.sched_getaffinity(0))
     processes = min(jobs or cores, most)
-    # On this machine only, and without the web page of Dask.
-    with (
-        distributed.LocalCluster(
-            n_workers=processes, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
-        ) as local,
-        distributed.Client(local) as client,
-    ):
-        yield client, max(1, cores // processes)
+    starting = True
+    try:
+        # On this machine only, and without the web page of Dask. Its logs, such as of processes that end after their
+        # scheduler, are not for users: errors are raised here.
+        with (
+            importlib.import_module("dask").config.set(
+                {"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical"}
+            ),
+            distributed.LocalCluster(
+                n_workers=processes,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address=None,
+                silence_logs=logging.CRITICAL,
+            ) as local,
+            distributed.Client(local) as client,
+        ):
+            starting = False
+            yield client, max(1, cores // processes)
+    except (*lost, RuntimeError) as error:
+        if isinstance(error, RuntimeError) and not starting:
+            raise
+        what = "could not be started" if starting else "were ended"
+        raise ClusterError(f"--cluster: processes {what}, perhaps for lack of memory; try fewer jobs") from error
 
 
 def _rows(sequence: FrameSequence, options: Options, begin: int, end: int, threads: int) -> list[Row]:

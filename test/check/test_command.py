@@ -19,7 +19,7 @@ import pytest
 from page_parts import Page
 from sources import SOURCES
 
-from hpccd_core.check import Options, check_part, command
+from hpccd_core.check import Options, check_part, command, workers
 from hpccd_core.check.workers import report_of
 from hpccd_core.sequences import open_sequence
 
@@ -115,6 +115,25 @@ def test_dask_gives_the_same_bytes(npz, tmp_path):
     assert check(npz, "--json", tmp_path / "alone") == 1
     assert check(npz, "--cluster", "--jobs", 4, "--json", tmp_path / "dask") == 1
     assert (tmp_path / "alone").read_bytes() == (tmp_path / "dask").read_bytes()
+
+
+def test_lost_dask_processes_are_a_sentence(npz, capsys, monkeypatch):
+    distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
+
+    def lost(*_):
+        raise distributed.KilledWorker("part", None, 4)
+
+    monkeypatch.setattr(workers, "on_cluster", lost)
+    assert check(npz, "--cluster", "--jobs", 1) == 2
+    error = capsys.readouterr().err
+    assert error == "hpccd-check: --cluster: processes were ended, perhaps for lack of memory; try fewer jobs\n"
+
+    def fails(**_):
+        raise RuntimeError("Nanny failed to start.")
+
+    monkeypatch.setattr(distributed, "LocalCluster", fails)
+    assert check(npz, "--cluster", "--jobs", 1) == 2
+    assert capsys.readouterr().err.startswith("hpccd-check: --cluster: processes could not be started, perhaps")
 
 
 def test_csv_has_a_row_for_each_frame(npz, expected, tmp_path):
