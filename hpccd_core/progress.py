@@ -13,7 +13,7 @@ Item = TypeVar("Item")
 
 def track(items: Iterable[Item], description: str, show: bool, total: int | None = None) -> Iterator[Item]:
     """The items, with a rich progress bar on stderr if `show` and stderr is a terminal."""
-    if not (show and sys.stderr.isatty()):
+    if not (show and sys.stderr and sys.stderr.isatty()):
         yield from items
         return
     from rich.console import Console
@@ -25,7 +25,7 @@ def track(items: Iterable[Item], description: str, show: bool, total: int | None
 @contextlib.contextmanager
 def counting(description: str, total: int) -> Iterator[Callable[[], None]]:
     """A function to call after each of `total` items, from any thread, with a bar as that of `track`."""
-    if not sys.stderr.isatty():
+    if not (sys.stderr and sys.stderr.isatty()):
         yield lambda: None
         return
     from rich.console import Console

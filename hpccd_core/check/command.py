@@ -13,7 +13,7 @@ distance. In each step to the next frame: what touches or passes through. All de
 
 Contacts assume that each vertex moves in a straight line from frame to frame.
 
-exit status: 0 clean; 1 surfaces touch, intersect or pass through each other; 2 unusable input; 130 interrupted
+exit status: 0 clean; 1 surfaces touch, intersect or pass through each other; 2 no verdict; 130 interrupted
 """
 
 from __future__ import annotations
@@ -26,14 +26,16 @@ import io
 import os
 import signal
 import sys
+import traceback
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TextIO
 
 from .._core import __version__
-from ..mesh_files.errors import MeshFileError, shortened
+from ..mesh_files.errors import MeshFileError, printable, shortened
 from ..progress import counting, track
 from ..sequences import FrameSequence, open_sequence
+from ..sequences.mesh_folder import SUFFIXES
 from ..sequences.opening import WHOLE
 from ..whole_file import whole_file
 from . import workers
@@ -42,6 +44,8 @@ from .report import COLUMNS, Report, cells, write_csv, write_json
 
 # Rows of the printed table; --csv has all.
 MOST_ROWS = 40
+# Columns of a terminal in which that table does not fit.
+NARROW = 60
 
 
 class CheckError(Exception):
@@ -112,8 +116,34 @@ def run(args: argparse.Namespace) -> int:
     Raises
     ------
     CheckError
-        Wrong use, or unusable input.
+        Wrong use, unusable input, or an error of the system or the program: whatever is no verdict.
     """
+    try:
+        reports = _checked(args)
+        try:
+            for report in reports:
+                _print(report, len(reports) > 1)
+        except OSError as error:
+            _discard(sys.stdout)
+            if not isinstance(error, BrokenPipeError):  # where the reader has gone, the verdict remains
+                raise
+    except CheckError:
+        raise
+    except OSError as error:
+        raise CheckError(f"{shortened(error.filename or 'output')}: {error.strerror or error}") from error
+    except Exception as error:
+        traceback.print_exc()
+        raise CheckError("this is an error in the program and no verdict; report it with the lines above") from error
+    return 0 if all(report.clean for report in reports) else 1
+
+
+def _checked(args: argparse.Namespace) -> list[Report]:
+    """The reports of all sequences; files are written."""
+    for name in (*FILES, "faces", "scheduler"):
+        if getattr(args, name) == "":
+            raise CheckError(f"--{name}: is empty; give a name or leave it out")
+    if "" in args.paths:
+        raise CheckError("PATH: is empty; give a folder, a pattern or files")
     if not 0.0 <= args.separation < float("inf"):
         raise CheckError(f"--separation {args.separation}: must be a finite number, 0 or more")
     if args.jobs < 0:
@@ -135,12 +165,13 @@ def run(args: argparse.Namespace) -> int:
             _write(drafts, sequences, options, reports, library, args)
     except (MeshFileError, workers.ClusterError) as error:
         raise CheckError(str(error)) from error
-    for report in reports:
-        _print(report, len(reports) > 1)
-    return 0 if all(report.clean for report in reports) else 1
+    return reports
 
 
 FILES = ("json", "csv", "html", "png")
+# Results never replace files that a sequence may consist of, such as the frames in a folder.
+INPUTS = (*SUFFIXES, *WHOLE, ".bin")
+PICTURES = ("", ".png", ".pdf", ".svg", ".jpg", ".jpeg")
 
 
 def _sequences(paths: list[str]) -> list[list[str]]:
@@ -157,6 +188,13 @@ def _reject_one_file_for_two(args: argparse.Namespace) -> None:
         if path := getattr(args, name):
             if what := used.get(os.path.realpath(path)):
                 raise CheckError(f"--{name} {shortened(path)}: is the file of {what}, too; give another name")
+            suffix = Path(os.path.realpath(path)).suffix.lower()
+            if suffix in INPUTS:
+                raise CheckError(f"--{name} {shortened(path)}: is a name of an input ({suffix}); give another name")
+            if name == "png" and suffix not in PICTURES:
+                raise CheckError(
+                    f"--png {shortened(path)}: is no name of a picture; use one of {', '.join(PICTURES[1:])}"
+                )
             used[os.path.realpath(path)] = f"--{name}"
 
 
@@ -244,37 +282,46 @@ def _print(report: Report, several: bool) -> None:
     """The table of what is wrong, notes, and the verdict."""
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     rows = report.bad_rows()
     console = Console(highlight=False)
-    if rows and console.is_terminal:
+    if rows and console.is_terminal and console.width >= NARROW:
         table = Table("frame", "file", "intersections", "distance", "inside", "contacts to next", "first at")
         for row in rows[:MOST_ROWS]:
-            table.add_row(*_short(cells(*row, unknown="not checked")))
+            table.add_row(*map(Text, _short(cells(*row, unknown="not checked"))))
         console.print(table)
     elif rows:
         print("\t".join(COLUMNS))
         for row in rows[:MOST_ROWS]:
-            print("\t".join(cells(*row, unknown="not checked")))
+            print("\t".join(map(printable, cells(*row, unknown="not checked"))))
     if len(rows) > MOST_ROWS:
         print(f"... {len(rows) - MOST_ROWS:,} more rows; --csv writes all")
     for note in report.notes:
-        print(f"note: {_printable(note)}")
-    print(f"{_printable(report.source)}: " * several + _printable(report.sentence()), flush=True)
+        print(f"note: {printable(note)}")
+    print(f"{printable(report.source)}: " * several + printable(report.sentence()), flush=True)
 
 
 def _short(row: list[str]) -> list[str]:
     """Numbers with few digits."""
     numbers = ("distance", "first_toc")
     return [
-        f"{float(text):.4g}" if name in numbers and text else _printable(text)
+        f"{float(text):.4g}" if name in numbers and text else printable(text)
         for name, text in zip(COLUMNS, row, strict=True)
     ]
 
 
-def _printable(text: str) -> str:
-    """For a terminal: control characters of file names are escaped."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+def _complain(text: str) -> None:
+    try:
+        print(f"hpccd-check: {text}", file=sys.stderr, flush=True)
+    except OSError:
+        _discard(sys.stderr)
+
+
+def _discard(stream: TextIO) -> None:
+    """What is left in a stream that cannot be written to would change the exit status when the process ends."""
+    with contextlib.suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 class _Parser(argparse.ArgumentParser):
@@ -313,6 +360,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("-V", "--version", action="version", version=f"hpccd-check {__version__}")
     configure(parser)
+    sys.stdout, sys.stderr = (stream or open(os.devnull, "w") for stream in (sys.stdout, sys.stderr))
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # file names need not be text of the terminal
@@ -321,13 +369,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         return run(args)
     except CheckError as error:
-        print(f"hpccd-check: {_printable(str(error))}", file=sys.stderr)
+        _complain(printable(str(error)))
         return 2
     except KeyboardInterrupt:
-        print("hpccd-check: interrupted", file=sys.stderr)
+        _complain("interrupted")
         return 130
-    except BrokenPipeError:  # the reader of the output has gone
-        sys.stderr.close()
-        return 0
     finally:
         signal.signal(signal.SIGTERM, before)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -95,21 +96,20 @@ def write_picture(sequence: FrameSequence, options: Options, report: Report, pat
     x = state.x if drawn.before is None else 0.5 * drawn.before.x + 0.5 * state.x
     parts = zip(state.frame.meshes, _of_meshes(state, x @ turn.T), state.scene.faces, strict=True)
     no_points = np.empty((0, 3))
-    picture.draw(
-        picture.Picture(
-            [(mesh.name, positions, faces, NO_EDGES) for mesh, positions, faces in parts],
-            no_points if contacts is None else np.asarray(contacts.points).reshape(-1, 3) @ turn.T,
-            np.empty(0) if contacts is None else _times(contacts),
-            _title(state.frame.index, report),
-            _facts(state.frame.index, report),
-            Path(report.source).name,
-            intersecting=np.concatenate(drawn.marked()),
-            contours=drawn.contours(turn),
-            intersecting_are=LABEL,
-        ),
-        path,
-        _history(report, state.frame.index),
+    step = picture.Picture(
+        [(mesh.name, positions, faces, NO_EDGES) for mesh, positions, faces in parts],
+        no_points if contacts is None else np.asarray(contacts.points).reshape(-1, 3) @ turn.T,
+        np.empty(0) if contacts is None else _times(contacts),
+        _title(state.frame.index, report),
+        _facts(state.frame.index, report),
+        Path(report.source).name,
+        intersecting=np.concatenate(drawn.marked()),
+        contours=drawn.contours(turn),
+        intersecting_are=LABEL,
     )
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing")  # of names in other scripts
+        picture.draw(step, path, _history(report, state.frame.index))
 
 
 class SequencePage:

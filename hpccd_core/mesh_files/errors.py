@@ -9,6 +9,11 @@ class MeshFileError(ValueError):
     """A mesh file cannot be used. The message names the file, the problem and the remedy."""
 
 
+def printable(text: str) -> str:
+    """The text with control characters, line ends and characters without an encoding escaped."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
 def shortened(text: object, longest: int = LONGEST) -> str:
     """The text; only its beginning, its length and its end if it has more than `longest` characters."""
     whole = str(text)

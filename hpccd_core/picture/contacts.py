@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 import hpccd_core as hc
-from hpccd_core.mesh_files.errors import shortened
+from hpccd_core.mesh_files.errors import printable, shortened
 from hpccd_core.picture import curves
 from hpccd_core.picture.camera import Camera
 from hpccd_core.picture.lines import Depth
@@ -250,8 +250,9 @@ def _draw_scene(axes, image, camera, depth, picture):
 
 def _write_title(figure, picture):
     figure.text(0.03, 0.945, picture.title, color=INK, fontsize=21, fontweight="bold", va="center")
-    figure.text(0.97, 0.945, picture.scene, color=INK, fontsize=14, va="center", ha="right")
-    facts = figure.text(0.03, 0.905, "   ·   ".join(picture.facts), color=FAINT, fontsize=11.5, va="center")
+    scene, words = printable(picture.scene), printable("   ·   ".join(picture.facts))
+    figure.text(0.97, 0.945, scene, color=INK, fontsize=14, va="center", ha="right", parse_math=False)
+    facts = figure.text(0.03, 0.905, words, color=FAINT, fontsize=11.5, va="center", parse_math=False)
     while facts.get_window_extent().x1 > 0.97 * figure.bbox.width and facts.get_fontsize() > 4:
         facts.set_fontsize(facts.get_fontsize() - 0.5)  # widths of letters are rounded: no proportion
     names = [name for name, *_ in picture.meshes]
@@ -263,9 +264,9 @@ def _write_title(figure, picture):
     if picture.depths:
         colours["penetration depth"] = curves.DEPTH
     if len(colours) <= MOST_NAMES:
-        figure.legend(
+        legend = figure.legend(
             handles=[Patch(color=colour) for colour in colours.values()],
-            labels=[shortened(name, 40) for name in colours],
+            labels=[printable(shortened(name, 40)) for name in colours],
             loc="upper left",
             bbox_to_anchor=(0.022, 0.892),
             ncols=len(colours),
@@ -276,6 +277,8 @@ def _write_title(figure, picture):
             handleheight=0.9,
             columnspacing=1.6,
         )
+        for text in legend.get_texts():
+            text.set_parse_math(False)  # a $ in a name is a $
 
 
 def _draw_times(axes, picture):

@@ -16,7 +16,9 @@ from .sequence import FrameSequence, SequenceError, SequenceMesh
 from .topology import FACE_NAMES, checked_faces, faces_of_file
 
 SUFFIXES = (".npz", ".npy")
+_MOST_COMPRESSED = 1 << 30  # bytes that are decompressed at once
 _POSITION_NAMES = ("vertices", "positions", "points", "v")
+_MOST_HEADER = 10_000  # as numpy accepts
 _NAMED = re.compile(rf"(?:(.*)[_./])?({'|'.join(_POSITION_NAMES + FACE_NAMES)})", re.DOTALL)
 
 
@@ -86,6 +88,7 @@ class ArrayFile(FrameSequence):
         if of_faces is None:
             assert file is not None
             return faces_of_file(file, stack.shape[-2])
+        _check_size(self._path, of_faces, math.prod(of_faces.shape) * of_faces.dtype.itemsize)
         with np.load(self._path, allow_pickle=False) as archive:
             return checked_faces(_place(self._path, of_faces), archive[of_faces.key], stack.shape[-2])
 
@@ -96,10 +99,13 @@ class ArrayFile(FrameSequence):
     def _positions(self, stack: _Stack, index: int) -> NDArray[np.float64]:
         """(V, 3) of a frame."""
         if stack.fortran:
+            if self._path.stat().st_size < stack.begin + math.prod(stack.shape) * stack.dtype.itemsize:
+                raise SequenceError(f"{_place(self._path, stack)}: was cut off while it was read; check it again")
             whole: NDArray[Any] = np.memmap(self._path, stack.dtype, "r", stack.begin, stack.shape, "F")
             return np.array(whole[index] if len(stack.shape) == 3 else whole, np.float64)
         shape = stack.shape[-2:]
         size = math.prod(shape) * stack.dtype.itemsize
+        _check_size(self._path, stack, size)
         file = self._file(stack)
         file.seek(stack.begin + index * size)
         data = file.read(size)
@@ -120,6 +126,14 @@ class ArrayFile(FrameSequence):
 
 def _place(path: Path, stack: _Stack) -> str:
     return f"{path}: {stack.key}" if stack.key else str(path)
+
+
+def _check_size(path: Path, stack: _Stack, size: int) -> None:
+    """Raises SequenceError for bytes that a small file can only declare."""
+    if stack.compressed and size > _MOST_COMPRESSED:
+        raise SequenceError(
+            f"{_place(path, stack)}: has {size >> 20:,} MiB in a frame, compressed; save it with numpy.savez"
+        )
 
 
 def _stacks(path: Path) -> list[_Stack]:
@@ -148,6 +162,11 @@ def _stacks(path: Path) -> list[_Stack]:
 
 def _stack(path: Path, key: str, file: IO[bytes], size: int, begin: int, compressed: bool) -> _Stack:
     version = np.lib.format.read_magic(file)
+    if version != (1, 0):
+        length = int.from_bytes(file.read(4), "little")
+        if length > _MOST_HEADER:
+            raise SequenceError(f"{path}: {key or 'it'} has a header of {length} bytes; save numbers only")
+        file.seek(file.tell() - 4)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, fortran, dtype = read(file)
     stack = _Stack(key, shape, dtype, begin + file.tell(), compressed, bool(fortran))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Meshes of glTF: morph targets, nodes and skins, moved by animations, in metres."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from ..mesh_files.errors import shortened
 from .gltf_animation import Channel, local_matrix
 from .gltf_file import GltfFile
 from .sequence import FrameSequence, SequenceError, SequenceMesh
-from .topology import checked_faces, short_names
+from .topology import checked_faces
 
 SUFFIXES = (".gltf", ".glb")
 _MOVES = ("translation", "rotation", "scale", "weights")
@@ -35,8 +36,7 @@ class GltfScene(FrameSequence):
         if not with_mesh:
             raise SequenceError(f"{path}: its scene has no meshes; export surfaces")
         names = [str(nodes[k].get("name") or f"node {k}") for k in with_mesh]
-        names = [f"{name} {k}" if names.count(name) > 1 else name for name, k in zip(names, with_mesh, strict=True)]
-        self._nodes = dict(sorted(zip(short_names(names, "\0"), with_mesh, strict=True)))
+        self._nodes = dict(sorted(zip(_told_apart(names, with_mesh), with_mesh, strict=True)))
         self._channels = self._animations(file)
         self._times = sorted({float(t) for channel in self._channels.values() for t in channel.times})
         built = {name: self._built(name, node) for name, node in self._nodes.items()}
@@ -231,6 +231,20 @@ class GltfScene(FrameSequence):
             weight = np.where(joints == joint, of_joints, 0.0).sum(axis=1, keepdims=True)
             moved += weight * _placed(matrices[joint], vertices)
         return moved
+
+
+def _told_apart(names: list[str], nodes: list[int]) -> list[str]:
+    """The names; those that are not unique have the number of the node behind them."""
+    counts = Counter(names)
+    taken = {name for name, count in counts.items() if count == 1}
+    for k, (name, node) in enumerate(zip(names, nodes, strict=True)):
+        if counts[name] > 1:
+            numbered = f"{name} {node}"
+            while numbered in taken:
+                numbered += f" {node}"
+            taken.add(numbered)
+            names[k] = numbered
+    return names
 
 
 def _placed(matrix: NDArray[np.float64], vertices: NDArray[np.float64]) -> NDArray[np.float64]:

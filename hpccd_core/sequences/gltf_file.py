@@ -3,8 +3,10 @@
 
 import base64
 import json
+import os
 import struct
 import urllib.parse
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,6 @@ from .sequence import SequenceError
 
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-_MOST = 10**8  # elements of an accessor: those without data need no file of that size
 _COMPRESSIONS = {
     "KHR_draco_mesh_compression": "Draco",
     "EXT_meshopt_compression": "meshopt",
@@ -26,8 +27,37 @@ _COMPRESSIONS = {
 _HARMLESS = ("KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_", "EXT_lights_")
 
 
+@dataclass(frozen=True)
+class _Buffer:
+    """Bytes in a file or in memory. Files are not mapped: a process ends where a mapped file shrinks.
+
+    Parameters
+    ----------
+    size : int
+        Its bytes.
+    source : Path or bytes
+        Where they are.
+    begin : int
+        The first of them in a file.
+    """
+
+    size: int
+    source: Path | bytes
+    begin: int = 0
+
+    def read(self, begin: int, size: int) -> bytes:
+        if isinstance(self.source, bytes):
+            return self.source[begin : begin + size]
+        with open(self.source, "rb") as file:
+            file.seek(self.begin + begin)
+            found = file.read(size)
+        if len(found) < size:
+            raise SequenceError(f"{self.source}: was cut off while it was read; check it again")
+        return found
+
+
 class GltfFile:
-    """A .gltf or .glb file, whose buffers are mapped into memory.
+    """A .gltf or .glb file, whose buffers are read when they are needed.
 
     Parameters
     ----------
@@ -42,8 +72,8 @@ class GltfFile:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._binary: NDArray[np.uint8] | None = None
-        self._buffers: dict[int, NDArray[np.uint8]] = {}
+        self._binary: _Buffer | None = None
+        self._buffers: dict[int, _Buffer] = {}
         self.json = self._glb() if path.suffix.lower() == ".glb" else self._parsed(path.read_bytes())
         version = str(self.json.get("asset", {}).get("version", "none"))
         if not version.startswith("2."):
@@ -64,44 +94,46 @@ class GltfFile:
         return found
 
     def _glb(self) -> dict[str, Any]:
-        whole = np.memmap(self._path, np.uint8, "r")
-        if len(whole) < 20 or bytes(whole[:4]) != b"glTF":
-            raise SequenceError(f"{self._path}: is not a GLB file (it does not begin with glTF); export it again")
-        _, version, length, size, kind = struct.unpack("<4sIII4s", bytes(whole[:20]))
-        if version != 2:
-            raise SequenceError(f"{self._path}: is GLB of version {version}; export version 2")
-        if length > len(whole) or 20 + size > length or kind != b"JSON":
-            raise SequenceError(
-                f"{self._path}: is cut off or damaged: it has {len(whole)} of {length} bytes; copy or export it again"
-            )
-        at = 20 + size
-        if at + 8 <= length:
-            binary, kind = struct.unpack("<I4s", bytes(whole[at : at + 8]))
-            if kind == b"BIN\0":
-                self._binary = whole[at + 8 : at + 8 + binary]
-        return self._parsed(bytes(whole[20:at]))
+        with open(self._path, "rb") as file:
+            whole = os.fstat(file.fileno()).st_size
+            head = file.read(20)
+            if len(head) < 20 or head[:4] != b"glTF":
+                raise SequenceError(f"{self._path}: is not a GLB file (it does not begin with glTF); export it again")
+            _, version, length, size, kind = struct.unpack("<4sIII4s", head)
+            if version != 2:
+                raise SequenceError(f"{self._path}: is GLB of version {version}; export version 2")
+            if length > whole or 20 + size > length or kind != b"JSON":
+                raise SequenceError(
+                    f"{self._path}: is cut off or damaged: it has {whole} of {length} bytes; copy or export it again"
+                )
+            text, chunk = file.read(size), file.read(8)
+        if 28 + size <= length and chunk[4:] == b"BIN\0":
+            binary = int.from_bytes(chunk[:4], "little")
+            self._binary = _Buffer(min(binary, whole - 28 - size), self._path, 28 + size)
+        return self._parsed(text)
 
-    def _buffer(self, number: int) -> NDArray[np.uint8]:
+    def _buffer(self, number: int) -> _Buffer:
         if number not in self._buffers:
             described = self.json["buffers"][number]
             uri = described.get("uri")
             if uri is None:
                 if self._binary is None or number:
                     raise SequenceError(f"{self._path}: buffer {number} has no data; copy or export it again")
-                data = self._binary
+                found = self._binary
             elif uri.startswith("data:"):
-                data = np.frombuffer(base64.b64decode(uri.partition(",")[2], validate=True), np.uint8)
+                data = base64.b64decode(uri.partition(",")[2], validate=True)
+                found = _Buffer(len(data), data)
             else:
                 file = self._path.parent / urllib.parse.unquote(uri)
                 if not file.is_file():
                     raise SequenceError(f"{self._path}: its buffer {shortened(uri)} does not exist; copy it beside it")
-                data = np.memmap(file, np.uint8, "r") if file.stat().st_size else np.empty(0, np.uint8)
-            if len(data) < described["byteLength"]:
+                found = _Buffer(file.stat().st_size, file)
+            if found.size < described["byteLength"]:
                 raise SequenceError(
-                    f"{self._path}: buffer {number} is cut off: it has {len(data)} of {described['byteLength']} bytes; "
-                    "copy or export it again"
+                    f"{self._path}: buffer {number} is cut off: it has {found.size} of {described['byteLength']} "
+                    "bytes; copy or export it again"
                 )
-            self._buffers[number] = data
+            self._buffers[number] = found
         return self._buffers[number]
 
     def accessor(self, number: int) -> NDArray[Any]:
@@ -109,8 +141,13 @@ class GltfFile:
         described = self.json["accessors"][number]
         count, width = described["count"], _WIDTHS[described["type"]]
         dtype = np.dtype(_COMPONENTS[described["componentType"]])
-        if not 0 <= count <= _MOST:
-            raise SequenceError(f"{self._path}: accessor {number} has {count} elements; use at most {_MOST}")
+        if "bufferView" not in described and not 0 <= count <= max(
+            (self._buffer(k).size for k in range(len(self.json.get("buffers", [])))), default=0
+        ):
+            raise SequenceError(
+                f"{self._path}: accessor {number} has {count} elements without data, more than its buffers have bytes; "
+                "export it again"
+            )
         if "bufferView" in described:
             values = self._view(described["bufferView"], described.get("byteOffset", 0), count, width, dtype)
         else:
@@ -133,7 +170,7 @@ class GltfFile:
         buffer = self._buffer(described["buffer"])
         item = width * dtype.itemsize
         stride = described.get("byteStride", item)
-        end = offset + (count - 1) * stride + item if count else 0
-        if min(begin, offset, count) < 0 or stride < item or end > length or begin + length > len(buffer):
+        end = offset + ((count - 1) * stride + item if count else 0)
+        if min(begin, offset, count) < 0 or stride < item or end > length or begin + length > buffer.size:
             raise SequenceError(f"{self._path}: an accessor ends beyond its buffer; copy or export it again")
-        return np.ndarray((count, width), dtype, buffer.data, begin + offset, (stride, dtype.itemsize))
+        return np.ndarray((count, width), dtype, buffer.read(begin + offset, end - offset), 0, (stride, dtype.itemsize))

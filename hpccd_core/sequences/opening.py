@@ -86,7 +86,7 @@ def open_sequence(
     names = [os.fspath(path) for path in given]
     source = shortened(names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more")
     with reading(source):
-        sequence = _opened(names, source, None if faces is None else Path(faces).expanduser())
+        sequence = _opened(names, source, None if faces is None else Path(os.path.expanduser(faces)))
     return SplitSequence(sequence) if split else sequence
 
 
@@ -112,11 +112,16 @@ def _opened(names: list[str], source: str, faces: Path | None) -> FrameSequence:
     return gltf.GltfScene(files[0]) if suffix in gltf.SUFFIXES else recording.Recording(files[0])
 
 
+def _no_file(path: Path) -> SequenceError:
+    what = "a folder" if path.is_dir() else "a broken link" if not path.exists() else "a device or a pipe"
+    return SequenceError(f"{shortened(path)}: is {what}; give a regular file")
+
+
 def _files(names: list[str]) -> list[Path]:
     """The files of folders, patterns and paths."""
     files: list[Path] = []
     for name in names:
-        path = Path(name).expanduser()
+        path = Path(os.path.expanduser(name))
         if path.is_dir():
             if len(names) > 1:
                 raise SequenceError(f"{shortened(name)}: is a folder among other paths; give one folder, or files")
@@ -128,9 +133,13 @@ def _files(names: list[str]) -> list[Path]:
             if not found:
                 raise SequenceError(f"{shortened(name)}: no file matches this pattern (from {Path.cwd()}); correct it")
             files += found
+        elif os.path.lexists(path):
+            raise _no_file(path)
         else:
             raise SequenceError(f"{shortened(name)}: no such file or folder (relative paths start from {Path.cwd()})")
     for file in files:
+        if not file.is_file():
+            raise _no_file(file)
         if file.suffix.lower() not in (*SUFFIXES, *WHOLE):
             raise SequenceError(f"{shortened(file)}: unknown format; use one of {', '.join((*SUFFIXES, *WHOLE))}")
     return files

@@ -15,7 +15,7 @@ from ..mesh_files.errors import shortened
 from .numbering import gaps_between
 from .packages import needed
 from .sequence import FrameSequence, SequenceError, SequenceMesh
-from .topology import checked_faces, same_or
+from .topology import checked_faces, same_or, short_names
 
 SUFFIXES = (".mcap",)
 _TOPOLOGY, _VERTICES = "hpccd/msg/MeshTopology", "hpccd/msg/MeshVertices"
@@ -91,12 +91,14 @@ class Recording(FrameSequence):
             if channel.schema_id
         }
         self._check_inputs(list(types))
-        meshes: dict[str, _Recorded] = {}
+        found: list[_Recorded] = []
         for topic in sorted(name for name, kind in types.items() if kind == _VERTICES):
             topology = f"{topic.rpartition('/')[0]}/topology"
             if types.get(topology) != _TOPOLOGY:
                 raise SequenceError(f"{self._path}: {topic} has no faces ({topology}); record both topics")
-            meshes[topology.split("/")[-2]] = _Recorded(topic, topology)
+            found.append(_Recorded(topic, topology))
+        folders = [mesh.topology.removesuffix("/topology") or "mesh" for mesh in found]
+        meshes = dict(zip(short_names(folders, "/"), found, strict=True))
         if not meshes:
             raise SequenceError(f"{self._path}: has no messages {_VERTICES}; {_REPLAY} if its meshes move by poses")
         by_topic = {mesh.topology: mesh for mesh in meshes.values()} | {mesh.vertices: mesh for mesh in meshes.values()}

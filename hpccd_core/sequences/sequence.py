@@ -5,12 +5,10 @@ from __future__ import annotations
 
 import contextlib
 import os
-import struct
 import threading
 import uuid
-import zipfile
-import zlib
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -46,6 +44,9 @@ class SequenceMesh:
     name: str
     faces: NDArray[np.uint32]
     n_vertices: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", _encodable(self.name))
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +111,9 @@ class FrameSequence(ABC):
     ) -> None:
         if n_frames < 1:
             raise SequenceError(f"{source}: has no frames; export it again")
-        self.source = source
+        self.source = _encodable(source)
         self.n_frames = n_frames
-        self.notes = notes
+        self.notes = tuple(map(_encodable, notes))
         self.gaps = gaps or {}
         self.up = up
 
@@ -155,11 +156,16 @@ class FrameSequence(ABC):
         with reading(self.source):
             name, meshes, vertices = self._read(index)
         _check(name, meshes, vertices)
-        return Frame(index, name, meshes, vertices)
+        return Frame(index, _encodable(name), meshes, vertices)
 
     @abstractmethod
     def _read(self, index: int) -> tuple[str, tuple[SequenceMesh, ...], NDArray[np.float64]]:
         """(name, meshes, vertices) of a frame."""
+
+
+def _encodable(text: str) -> str:
+    """Bytes of a file name that are no UTF-8 are escaped, so that every report can hold it."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 # Workers of a pool get a new copy of a sequence with each part: the last ones keep their files open.
@@ -190,19 +196,9 @@ def reading(source: str) -> Iterator[None]:
     except OSError as error:
         where = shortened(error.filename) if error.filename else source
         raise SequenceError(f"{where}: cannot be read: {error.strerror or error}; give another file") from error
-    except (
-        ArithmeticError,
-        AttributeError,
-        EOFError,
-        LookupError,
-        RuntimeError,
-        TypeError,
-        ValueError,
-        struct.error,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
-        raise SequenceError(f"{source}: is damaged: {shortened(error)}; copy or export it again") from error
+    except Exception as error:  # parsers raise whatever they meet
+        why = shortened(" ".join(str(error).split())) or type(error).__name__
+        raise SequenceError(f"{source}: is damaged: {why}; copy or export it again") from error
 
 
 def _check(name: str, meshes: tuple[SequenceMesh, ...], vertices: NDArray[np.float64]) -> None:
@@ -210,6 +206,13 @@ def _check(name: str, meshes: tuple[SequenceMesh, ...], vertices: NDArray[np.flo
     # Two reductions, because they need no further array; NaN passes through both and compares false.
     if not len(vertices):
         raise SequenceError(f"{name}: has no vertices; export it again")
+    if len(vertices) != (n := sum(mesh.n_vertices for mesh in meshes)):
+        raise SequenceError(f"{name}: has {len(vertices)} positions of {n} vertices; export it again")
+    names = Counter(mesh.name for mesh in meshes)
+    if len(names) < len(meshes):
+        raise SequenceError(
+            f"{name}: has several meshes named {names.most_common(1)[0][0]!r}; give each a name of its own"
+        )
     if -LARGEST_COORDINATE <= float(vertices.min()) and float(vertices.max()) <= LARGEST_COORDINATE:
         return
     finite = np.isfinite(vertices).all(axis=1)

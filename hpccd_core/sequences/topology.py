@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Faces from arrays and from files."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +72,8 @@ def faces_of_file(path: Path, n_vertices: int) -> NDArray[np.uint32]:
         The file cannot be read, or does not fit the number of vertices.
     """
     suffix = path.suffix.lower()
+    if not path.is_file():
+        raise SequenceError(f"{path}: is no file; give a mesh file, .npy or .npz with the faces")
     if suffix in (".npy", ".npz"):
         return checked_faces(str(path), _array(path), n_vertices)
     if suffix not in FORMATS:
@@ -111,4 +114,5 @@ def same_or(last: tuple[SequenceMesh, ...] | None, meshes: tuple[SequenceMesh, .
 def short_names(paths: list[str], separator: str) -> list[str]:
     """The last parts of paths, or whole paths where two of these parts are the same."""
     last = [path.rpartition(separator)[2] or path for path in paths]
-    return [path if last.count(name) > 1 else name for path, name in zip(paths, last, strict=True)]
+    counts = Counter(last)
+    return [path if counts[name] > 1 else name for path, name in zip(paths, last, strict=True)]

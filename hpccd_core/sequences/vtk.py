@@ -32,6 +32,8 @@ def load(path: Path) -> MeshFile:
     SequenceError
         The file is damaged, or has cells that are neither polygons nor tetrahedra.
     """
+    if not path.is_file():
+        raise SequenceError(f"{path}: is no file; give regular files")
     cells = parse(path, path.read_bytes()) if path.suffix.lower() == ".vtk" else _of_vtu(path)
     known = np.isin(cells.types, (*_NO_SURFACE, *_POLYGONS, _TETRAHEDRON))
     if not known.all():

@@ -22,6 +22,7 @@ _TYPES = {
     "vtkidtype": ">i4",
 }
 _HEADER = re.compile(rb"# vtk DataFile[^\n]*\n[^\n]*\n\s*(ASCII|BINARY)\s+DATASET\s+(\w+)[^\n]*\n", re.IGNORECASE)
+_LONGEST_NUMBER, _MOST_SECTIONS = 100, 100
 POLYGON = 7  # cell type of VTK
 
 
@@ -71,7 +72,11 @@ class _Reader:
     def parse(self) -> Cells:
         points, corners, counts = np.empty((0, 3)), np.empty(0, np.int64), np.empty(0, np.int64)
         types: NDArray[np.int64] | None = None
+        sections: list[str] = []
         while words := self._words():
+            sections.append(words[0].upper())
+            if sections.count(sections[-1]) > _MOST_SECTIONS:  # each is a copy of the rest of an ASCII file
+                raise SequenceError(f"{self._path}: has too many sections {words[0][:40]!r}; export it again")
             match [words[0].upper(), *words[1:]]:
                 case ["POINTS", n, kind]:
                     points = self._array(3 * int(n), kind).astype(np.float64).reshape(-1, 3)
@@ -99,6 +104,8 @@ class _Reader:
         return Cells(points, corners, counts, types)
 
     def _skip_fields(self, n: int) -> None:
+        if n > _MOST_SECTIONS:
+            raise SequenceError(f"{self._path}: has {n} fields; export it with at most {_MOST_SECTIONS}, or without")
         for _ in range(n):
             _, width, height, kind = self._words()[:4]
             self._array(int(width) * int(height), kind)
@@ -116,6 +123,8 @@ class _Reader:
 
     def _cells(self, n: int, size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """(corners, counts). Since version 5, sizes are those of the two arrays OFFSETS and CONNECTIVITY."""
+        if min(n, size) < 0 or max(n, size) > len(self._data):
+            raise self._cut_off()
         begin = self._at
         words = self._words()
         if words and words[0].upper() == "OFFSETS":
@@ -137,6 +146,8 @@ class _Reader:
         dtype = np.dtype(_TYPES.get(kind.lower(), "V"))
         if dtype.kind == "V":
             raise SequenceError(f"{self._path}: has numbers of type {kind[:40]}; export float or double, and int")
+        if not 0 <= n <= len(self._data):
+            raise self._cut_off()
         if self._binary:
             end = self._at + n * dtype.itemsize
             if end > len(self._data):
@@ -147,6 +158,10 @@ class _Reader:
         words = self._data[self._at :].split(None, n)
         if len(words) < n:
             raise self._cut_off()
+        if max(map(len, words[:n]), default=0) > _LONGEST_NUMBER:  # an array has the width of its longest word
+            raise SequenceError(
+                f"{self._path}: has a word of more than {_LONGEST_NUMBER} characters among its numbers; export it again"
+            )
         self._at = len(self._data) - len(words[n]) if len(words) > n else len(self._data)
         return np.array(words[:n]).astype(dtype.newbyteorder("="))
 

@@ -154,6 +154,15 @@ add("vtk_of_points", "has no faces", in_file("a.vtk", POLY_DATA[: POLY_DATA.inde
 add("vtk_face_out_of_range", "names vertex 7", in_file("a.vtk", POLY_DATA.replace("0 2 3", "0 2 7")))
 add("vtk_of_voxels", "data set STRUCTURED_POINTS", in_file("a.vtk", POLY_DATA.replace("POLYDATA", "STRUCTURED_POINTS")))
 add("vtk_strips", "has triangle strips", in_file("a.vtk", POLY_DATA.replace("POLYGONS", "TRIANGLE_STRIPS")))
+BINARY = POLY_DATA.replace("ASCII", "BINARY")
+add("vtk_of_negative_size", "is cut off", in_file("a.vtk", BINARY.replace("POINTS 4", "POINTS -1")))
+add("vtk_of_huge_size", "is cut off", in_file("a.vtk", POLY_DATA.replace("POLYGONS 2 8", "POLYGONS 2000000000000 8")))
+add(
+    "vtk_of_long_words",
+    "a word of more than 100 characters",
+    in_file("a.vtk", POLY_DATA.replace("1 1 0", "1 1" + "0" * 999)),
+)
+add("vtk_of_many_sections", "too many sections", in_file("a.vtk", POLY_DATA + "LINES 1 1\n0\n" * 101))
 add("text_as_vtu", "cannot be read as VTU", in_file("a.vtu", "hello"), "meshio")
 VOXEL = """<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian"><UnstructuredGrid>
 <Piece NumberOfPoints="8" NumberOfCells="1">
@@ -251,6 +260,20 @@ def faces_of_unknown_format(folder):
     np.save(folder / "a.npy", VERTICES[None])
     (folder / "a.txt").write_text("0 1 2")
     return [folder / "a.npy"], {"faces": folder / "a.txt"}
+
+
+@malformed("is damaged")
+def npy_of_an_open_bracket(folder):
+    np.save(folder / "b.npy", VERTICES[None])
+    (folder / "a.npy").write_bytes((folder / "b.npy").read_bytes().replace(b"(1, 4, 3)", b"((1, 4, 3"))
+    (folder / "a.obj").write_text(SQUARE)
+    return [folder / "a.npy"], {"faces": folder / "a.obj"}
+
+
+@malformed("has a header of")
+def npy_of_a_huge_header(folder):
+    (folder / "a.npy").write_bytes(b"\x93NUMPY\x02\x00\xff\xff\xff\xff" + bytes(100))
+    return [folder / "a.npy"], {}
 
 
 # Point caches.
