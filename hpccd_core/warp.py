@@ -52,8 +52,8 @@ def scene_of(model: Any, *, self_collision: bool = True) -> Scene:
 
     Raises
     ------
-    ValueError
-        If the model has no particles, or if its worlds differ.
+    TypeError, ValueError
+        If it is no model, has no particles, or if its worlds differ.
 
     Notes
     -----
@@ -106,9 +106,11 @@ def worlds_of(model: Any) -> int | None:
 
     Raises
     ------
-    ValueError
-        If the model has no particles, or some in worlds and others in none.
+    TypeError, ValueError
+        If it is no model, has no particles, or some in worlds and others in none.
     """
+    if not hasattr(model, "particle_world") or isinstance(model.particle_world, list):  # that of a builder
+        raise TypeError(f"model: expected newton.Model, got {type(model).__name__}; make one with finalize()")
     if not model.particle_count:
         raise ValueError("model: has no particles; rigid shapes are not part of the scene")
     world = model.particle_world.numpy()
@@ -136,16 +138,16 @@ def positions(model: Any, state: Any) -> Any:
 
     Raises
     ------
-    ValueError
-        If the array is not that of the model's particles.
+    TypeError, ValueError
+        If `model` is no model, or the array is not that of its particles.
     """
+    worlds = worlds_of(model)
     array: Any = getattr(state, "particle_q", state)
     found = f"{array.dtype.__name__} of shape {array.shape}" if isinstance(array, wp.array) else type(array).__name__
     if found != f"vec3f of shape ({model.particle_count},)":
         raise ValueError(f"state: expected an array of vec3 for {model.particle_count} particles, got {found}")
     if not array.is_contiguous:
         raise ValueError("state: must be C-contiguous; copy it first, as with array.contiguous()")
-    worlds = worlds_of(model)
     shaped = array if worlds is None else array.reshape((worlds, model.particle_count // worlds))
     return shaped.numpy() if array.device.is_cpu else shaped
 
@@ -164,7 +166,14 @@ def arrays(result: _Result) -> dict[str, Any]:
         Names, shapes and dtypes of the result: `vf` (N, 2) uint32, `vf_toc` (N,) float64, and so on; the outputs that
         the detector was asked for; with worlds the offsets too, such as `vf_offsets` (W+1,) int64. They are on Warp's
         CPU device for results on the host. Each array keeps its memory alive.
+
+    Raises
+    ------
+    TypeError
+        If it is none of these results.
     """
+    if not isinstance(result, _Result):
+        raise TypeError(f"result: expected that of detect, proximity or intersections, got {type(result).__name__}")
     found = {field.name: getattr(result, field.name) for field in dataclasses.fields(result)}
     found |= getattr(result, "outputs", {})
     if result.slices is not None:

@@ -21,6 +21,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import difflib
+import glob
 import importlib
 import io
 import os
@@ -174,20 +175,29 @@ INPUTS = (*SUFFIXES, *WHOLE, ".bin")
 PICTURES = ("", ".png", ".pdf", ".svg", ".jpg", ".jpeg")
 
 
-def _sequences(paths: list[str]) -> list[list[str]]:
+def _sequences(given: list[str]) -> list[list[str]]:
     """The paths of each sequence: mesh files and patterns belong to one, a folder or a whole file is one of its own."""
+    paths = [path for word in given for path in _whole_files(word) or [word]]
     whole = [path for path in paths if os.path.isdir(path) or Path(path).suffix.lower() in WHOLE]
     rest = [path for path in paths if path not in whole]
     return [[path] for path in dict.fromkeys(whole)] + ([rest] if rest else [])
 
 
+def _whole_files(pattern: str) -> list[str]:
+    """The files of a pattern, as a shell would list them, if each has all frames of a sequence."""
+    if os.path.exists(pattern) or not glob.has_magic(pattern):
+        return []
+    found = sorted(glob.glob(os.path.expanduser(pattern)))
+    return found if all(Path(path).suffix.lower() in WHOLE for path in found) else []
+
+
 def _reject_one_file_for_two(args: argparse.Namespace) -> None:
     """Raises CheckError if a result would replace another one, or the input."""
-    used = {os.path.realpath(path): "input" for path in [*args.paths, *([args.faces] if args.faces else [])]}
+    used = {os.path.realpath(path): "an input" for path in [*args.paths, *([args.faces] if args.faces else [])]}
     for name in FILES:
         if path := getattr(args, name):
             if what := used.get(os.path.realpath(path)):
-                raise CheckError(f"--{name} {shortened(path)}: is the file of {what}, too; give another name")
+                raise CheckError(f"--{name} {shortened(path)}: is {what}, too; give another name")
             suffix = Path(os.path.realpath(path)).suffix.lower()
             if suffix in INPUTS:
                 raise CheckError(f"--{name} {shortened(path)}: is a name of an input ({suffix}); give another name")
@@ -195,7 +205,7 @@ def _reject_one_file_for_two(args: argparse.Namespace) -> None:
                 raise CheckError(
                     f"--png {shortened(path)}: is no name of a picture; use one of {', '.join(PICTURES[1:])}"
                 )
-            used[os.path.realpath(path)] = f"--{name}"
+            used[os.path.realpath(path)] = f"the file of --{name}"
 
 
 def _library(args: argparse.Namespace) -> Any:
@@ -324,6 +334,12 @@ def _discard(stream: TextIO) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
+def _nearest(word: str, options: list[str]) -> str:
+    """The option that a word begins, or is spelled like; empty if there is none."""
+    begun = [option for option in options if len(word) > 3 and option.startswith(word.lower())]
+    return (begun or difflib.get_close_matches(word, options, n=1, cutoff=0.7) or [""])[0]
+
+
 class _Parser(argparse.ArgumentParser):
     """Names the option that a misspelt one is nearest to."""
 
@@ -334,8 +350,8 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         options = [option for option in self._option_string_actions if option.startswith("--")]
         words = [word.partition("=")[0] for word in self._given if word.startswith("--")]
-        near = [difflib.get_close_matches(word, options, n=1, cutoff=0.7) for word in words if word not in options]
-        meant = "; did you mean " + ", ".join(names[0] for names in near if names) + "?" if any(near) else ""
+        near = [_nearest(word, options) for word in words if word not in options]
+        meant = "; did you mean " + ", ".join(name for name in near if name) + "?" if any(near) else ""
         super().error(message + meant)
 
 

@@ -276,7 +276,7 @@ def _times(contacts: Contacts) -> NDArray[np.float64]:
 
 def _title(index: int, report: Report) -> str:
     contacts = report.steps[index - 1].contacts if index else 0
-    frame = f"frame {index} of {len(report.frames) - 1}"
+    frame = f"frame {index}"
     return f"{contacts:,} contact{'' if contacts == 1 else 's'} in the step to {frame}" if contacts else frame
 
 

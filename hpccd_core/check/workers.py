@@ -136,10 +136,13 @@ def cluster(distributed: Any, scheduler: str | None, jobs: int, most: int) -> It
         try:
             client = distributed.Client(scheduler, timeout="60s")
         except (OSError, ValueError, TimeoutError) as error:
-            raise ClusterError(f"--scheduler {scheduler}: no Dask scheduler responds there: {error}") from error
+            raise ClusterError(
+                f"--scheduler {scheduler}: no Dask scheduler responds there ({error}); start one (dask scheduler) or "
+                "correct the address"
+            ) from error
         with client:
             if not client.scheduler_info(n_workers=-1)["workers"]:
-                raise ClusterError(f"--scheduler {scheduler}: a cluster without workers: start some (dask worker)")
+                raise ClusterError(f"--scheduler {scheduler}: the cluster has no workers; start some (dask worker)")
             try:
                 yield client, 0
             except lost as error:

@@ -26,16 +26,18 @@ def in_folder(folder: Path) -> list[Path]:
         There are none, or several formats.
     """
     with os.scandir(folder) as entries:
-        names = [entry.name for entry in entries if not entry.name.startswith(".") and not entry.is_dir()]
+        listed = [(entry.name, entry.is_dir()) for entry in entries if not entry.name.startswith(".")]
+    names = sorted(name for name, is_folder in listed if not is_folder)
     by_suffix: dict[str, list[Path]] = {}
-    for name in sorted(names):
+    for name in names:
         if (suffix := Path(name).suffix.lower()) in SUFFIXES:
             by_suffix.setdefault(suffix, []).append(folder / name)
     if not by_suffix:
-        others = f" (it has {', '.join(sorted(names)[:3])}{', ...' if len(names) > 3 else ''})" if names else ""
+        there = sorted(f"{name}/" if is_folder else name for name, is_folder in listed)
+        others = f" (it has {', '.join(there[:3])}{', ...' if len(there) > 3 else ''})" if there else ""
         raise SequenceError(
-            f"{folder}: has no mesh files{others}; give a folder with {', '.join(SUFFIXES)} files, or one file with "
-            "all frames"
+            f"{folder}: has no mesh files{others}; give a folder with {', '.join(SUFFIXES)} files, a pattern such as "
+            f"'{folder}/*/*.obj', or files with all frames, such as '{folder}/*.npz'"
         )
     if len(by_suffix) > 1:
         first, second = sorted(by_suffix)[:2]

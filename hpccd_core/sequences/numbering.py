@@ -9,6 +9,7 @@ from pathlib import Path
 
 from .sequence import SequenceError
 
+_FRACTION = re.compile(r"(.*[0-9])\.[0-9]+", re.DOTALL)
 _SEPARATORS = " ._-/"
 _MOST_NOTES = 10  # gaps that are listed one by one
 
@@ -47,11 +48,13 @@ def arrange(files: list[Path]) -> Numbered:
     Raises
     ------
     SequenceError
-        Two files have the same number, or meshes have different frames.
+        Two files have the same number, numbers have fractions, or meshes have different frames.
     """
     found: dict[tuple[str, str], dict[int, Path]] = {}
     names = dict(zip(files, _relative(files), strict=True))
-    parts = _parts([name.removesuffix(file.suffix) for file, name in names.items()])
+    stems = [name.removesuffix(file.suffix) for file, name in names.items()]
+    _reject_fractions(dict(zip(stems, files, strict=True)))
+    parts = _parts(stems)
     for file, (prefix, number, suffix) in zip(names, parts, strict=True):
         of_mesh = found.setdefault((prefix, suffix), {})
         if number in of_mesh:
@@ -78,6 +81,17 @@ def _relative(files: list[Path]) -> list[str]:
         return [file.name for file in files]
     common = os.path.commonpath([file.absolute().parent for file in files])
     return [file.absolute().relative_to(common).as_posix() for file in files]
+
+
+def _reject_fractions(files: dict[str, Path]) -> None:
+    """Raises SequenceError for names such as cloth.1.25 beside cloth.1 and cloth.2: no order by whole numbers fits."""
+    pairs = [(name, match[1]) for name in files if (match := _FRACTION.fullmatch(name)) and match[1] in files]
+    if len({whole for _, whole in pairs}) > 1:
+        name, whole = min(pairs)
+        raise SequenceError(
+            f"{files[name]}: its number looks like a fraction of a frame, because {files[whole].name} is there too; "
+            "number all frames by whole numbers"
+        )
 
 
 def _parts(names: list[str]) -> list[tuple[str, int, str]]:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Choose the reader of a sequence."""
 
+import difflib
 import glob
 import os
 from collections.abc import Sequence
@@ -99,7 +100,7 @@ def _opened(names: list[str], source: str, faces: Path | None) -> FrameSequence:
         return MeshFolder(files, source)
     if len(files) > 1:
         whole = next(file for file in files if file.suffix.lower() not in SUFFIXES)
-        raise SequenceError(f"{shortened(whole)}: is a whole sequence; give it alone")
+        raise SequenceError(f"{shortened(whole)}: has all frames of a sequence; give it alone")
     suffix = suffixes.pop()
     if suffix in arrays.SUFFIXES:
         return arrays.ArrayFile(files[0], faces)
@@ -136,10 +137,24 @@ def _files(names: list[str]) -> list[Path]:
         elif os.path.lexists(path):
             raise _no_file(path)
         else:
-            raise SequenceError(f"{shortened(name)}: no such file or folder (relative paths start from {Path.cwd()})")
+            raise SequenceError(
+                f"{shortened(name)}: no such file or folder{_nearest(path)} (relative paths start from {Path.cwd()})"
+            )
     for file in files:
         if not file.is_file():
             raise _no_file(file)
         if file.suffix.lower() not in (*SUFFIXES, *WHOLE):
-            raise SequenceError(f"{shortened(file)}: unknown format; use one of {', '.join((*SUFFIXES, *WHOLE))}")
+            raise SequenceError(
+                f"{shortened(file)}: unknown format; use one of {', '.join((*SUFFIXES, *WHOLE))}; other files are "
+                "ignored in a folder"
+            )
     return files
+
+
+def _nearest(path: Path) -> str:
+    """The end of an error message: the name in the same folder that is spelled most like the path, if one is."""
+    try:
+        near = difflib.get_close_matches(path.name, os.listdir(path.parent), n=1, cutoff=0.8)
+    except OSError:
+        return ""
+    return f"; did you mean {shortened(path.with_name(near[0]))}?" if near else ""

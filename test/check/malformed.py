@@ -57,6 +57,7 @@ add("missing_path", "no such file or folder", lambda folder: ([folder / "cloth"]
 add("no_paths", "no file is given", lambda folder: ([], {}))
 add("pattern_without_match", "no file matches", lambda folder: ([f"{folder}/*.obj"], {}))
 add("empty_folder", "has no mesh files", lambda folder: ([folder], {}))
+add("fractions", "looks like a fraction", lambda d: frames(d, **{f"f.{n}": SQUARE for n in ("1", "1.5", "2", "2.5")}))
 add("unknown_format", "unknown format", in_file("cloth.fbx", "Kaydara"))
 add("no_suffix", "unknown format", in_file("cloth", SQUARE))
 
@@ -65,6 +66,19 @@ add("no_suffix", "unknown format", in_file("cloth", SQUARE))
 def folder_of_other_files(folder):
     (folder / "notes.txt").write_text("no mesh")
     return [folder], {}
+
+
+@malformed("has no mesh files (it has frame_1/); give")
+def a_folder_for_each_frame(folder):
+    (folder / "frame_1").mkdir()
+    frames(folder / "frame_1", cloth=SQUARE)
+    return [folder], {}
+
+
+@malformed("did you mean")
+def misspelt_path(folder):
+    frames(folder, cloth_1=SQUARE)
+    return [folder / "cloht_1.obj"], {}
 
 
 @malformed("has .obj and .ply files")
@@ -80,7 +94,7 @@ def folder_and_file(folder):
     return [folder, folder / "a_1.obj"], {}
 
 
-@malformed("is a whole sequence; give it alone")
+@malformed("has all frames of a sequence; give it alone")
 def two_whole_sequences(folder):
     for name in ("a.npz", "b.npz"):
         np.savez(folder / name, vertices=VERTICES[None], faces=FACES)

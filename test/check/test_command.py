@@ -284,14 +284,24 @@ def test_wrong_use_is_a_sentence(words, says, npz, capsys, monkeypatch, tmp_path
 
 def test_a_result_replaces_neither_input_nor_another_result(npz, tmp_path, capsys):
     assert check(npz, "--json", npz) == 2
-    assert f"--json {npz}: is the file of input, too; give another name" in capsys.readouterr().err
+    assert f"--json {npz}: is an input, too; give another name" in capsys.readouterr().err
     assert check(npz, "--json", tmp_path / "x", "--csv", tmp_path / "x") == 2
     assert "is the file of --json, too" in capsys.readouterr().err
 
 
-def test_a_misspelt_option_names_the_nearest(npz, capsys):
+def test_a_quoted_pattern_is_what_the_shell_makes_of_it(tmp_path, capsys):
+    clean = planted.positions([])
+    planted.write_npz(tmp_path, {name: of_mesh[:2] for name, of_mesh in clean.items()})
+    (tmp_path / "planted.npz").rename(tmp_path / "a.npz")
+    (tmp_path / "b.npz").write_bytes((tmp_path / "a.npz").read_bytes())
+    assert check(tmp_path / "*.npz") == 0
+    assert [line.split(": ")[1] for line in capsys.readouterr().out.splitlines() if "clean" in line] == ["clean"] * 2
+
+
+@pytest.mark.parametrize("option", ["--sepration", "--sep"])
+def test_a_misspelt_option_names_the_nearest(option, npz, capsys):
     with pytest.raises(SystemExit) as ended:
-        check(npz, "--sepration", 1)
+        check(npz, option, 1)
     assert ended.value.code == 2 and "did you mean --separation?" in capsys.readouterr().err
 
 

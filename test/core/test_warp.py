@@ -179,3 +179,16 @@ def test_states_that_are_rejected():
     ):
         with pytest.raises(ValueError, match=re.escape(message)):
             hcw.positions(model, wrong)
+
+
+@pytest.mark.parametrize(
+    "call", [hcw.scene_of, hcw.worlds_of, lambda builder: hcw.positions(builder, None)], ids=["scene", "worlds", "x"]
+)
+def test_a_builder_is_no_model(call):
+    with pytest.raises(TypeError, match=re.escape("model: expected newton.Model, got ModelBuilder")):
+        call(cloths())
+
+
+def test_arrays_of_something_else_are_a_sentence():
+    with pytest.raises(TypeError, match="result: expected that of detect, proximity or intersections, got list"):
+        hcw.arrays([])
