@@ -146,6 +146,7 @@ class SequencePage:
         self._steps.append(
             {
                 "step": str(index),
+                "where": f"the step to frame {index}" if index else "frame 0",
                 "time": None,
                 "total": n_contacts,
                 "drawn": drawn_contacts,

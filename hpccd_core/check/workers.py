@@ -16,7 +16,9 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
-from ..sequences import FrameSequence
+import numpy as np
+
+from ..sequences import Frame, FrameSequence
 from .analysis import Options, check_part
 from .report import FrameResult, Report, StepResult
 
@@ -34,8 +36,23 @@ class ClusterError(Exception):
 
 def report_of(sequence: FrameSequence, options: Options, rows: list[Row], notes: tuple[str, ...] = ()) -> Report:
     """The report of the rows of all frames."""
-    steps = [step for _, step in rows if step is not None]
-    return Report(sequence.source, [frame for frame, _ in rows], steps, sequence.notes + notes, options.separation)
+    frames, steps = [frame for frame, _ in rows], [step for _, step in rows if step is not None]
+    if frames[0].intersections and not (options.weld or options.changes):
+        notes += _seams(sequence.frame(0))
+    return Report(sequence.source, frames, steps, sequence.notes + notes, options.separation)
+
+
+def _seams(frame: Frame) -> tuple[str, ...]:
+    """A note about vertices that share a position with another one of their mesh: they may be the only contacts."""
+    doubled, first = 0, 0
+    for mesh in frame.meshes:
+        x = frame.vertices[first + np.unique(mesh.faces)]
+        doubled += len(x) - len(np.unique(x, axis=0))
+        first += mesh.n_vertices
+    if not doubled:
+        return ()
+    what = "1 vertex has" if doubled == 1 else f"{doubled:,} vertices have"
+    return (f"{what} the position of another one of the same mesh in the first frame; --weld joins them at seams",)
 
 
 def in_processes(

@@ -318,6 +318,7 @@ def _draw_history(axes, history):
     axes.set_ylim(0, max(1, history.contacts.max() * 1.1))
     axes.set_ylabel("contacts", color="#e0668c", fontsize=9)
     axes.set_xlabel("step", color=FAINT, fontsize=9, labelpad=1)
+    axes.locator_params(axis="x", integer=True)
     _style(axes)
     if history.milliseconds is not None:
         times = axes.twinx()

@@ -153,6 +153,7 @@ def test_page_and_picture_show_the_defects(npz, expected, tmp_path):
     frames, steps = expected
     assert [mesh["name"] for mesh in page.said["meshes"]] == list(planted.NAMES)
     assert [step["step"] for step in page.said["steps"]] == [str(k) for k in range(planted.N_FRAMES)]
+    assert [step["where"] for step in page.said["steps"]][:2] == ["frame 0", "the step to frame 1"]
     assert [step["total"] for step in page.said["steps"]] == [0, *(step.contacts for step in steps)]
     marked = {k for k, step in enumerate(page.said["steps"]) if any(step["intersecting"])}
     assert marked == {frame.index for frame in frames if frame.intersections}
@@ -241,7 +242,9 @@ def test_weld_joins_doubled_vertices(tmp_path, capsys):
     folder = tmp_path / "seam"
     folder.mkdir()
     assert check(write_frames(folder, doubled, doubled)) == 1
+    assert "note: 2 vertices have the position of another one of the same mesh" in capsys.readouterr().out
     assert check(folder, "--weld") == 0
+    assert "note" not in capsys.readouterr().out
     write_frames(folder, doubled, torn)
     assert check(folder, "--weld") == 2
     assert "vertices 1 and 3, at one position in the first frame, are apart here" in capsys.readouterr().err

@@ -95,10 +95,10 @@ class Chart {
   }
 
   describe(context, step, x, width) {
-    const { step: number, total, milliseconds } = this.recording.steps[step];
+    const { step: number, where, total, milliseconds } = this.recording.steps[step];
     const what = total === null ? "no contacts known" : `${total.toLocaleString("en")} contacts`
       + (milliseconds === null ? "" : `, ${milliseconds.toFixed(1)} ms`);
-    const text = `step ${number}: ${what}`, half = context.measureText(text).width / 2;
+    const text = `${where ?? `step ${number}`}: ${what}`, half = context.measureText(text).width / 2;
     context.textAlign = "center";
     context.fillText(text, Math.max(Chart.LEFT + half, Math.min(width - Chart.RIGHT - half, x(step + 0.5))), 10);
   }

@@ -168,9 +168,9 @@ class Viewer {
   show(step) {
     this.step = step;
     const { steps } = this.recording;
-    const { step: number, total, facts, notices, time } = steps[step];
+    const { step: number, where, total, facts, notices, time } = steps[step];
     const what = total === null ? "No contacts known" : `${total.toLocaleString("en")} contact${total === 1 ? "" : "s"}`;
-    byId("title").textContent = `${what} in step ${number} of ${steps.at(-1).step}`;
+    byId("title").textContent = `${what} in ${where ?? `step ${number} of ${steps.at(-1).step}`}`;
     // Lines break between facts only.
     byId("facts").textContent = facts.map((fact) => fact.replaceAll(" ", "\u00a0")).join("  ·  ") || "\u00a0";
     const calm = total === 0 ? ["No contacts in this step."] : [];
