@@ -49,7 +49,7 @@ class State:
 
 
 class Checker:
-    """Reads frames of a sequence and answers for each frame and step.
+    """Reads frames of a sequence and checks frames and steps.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ distance. In each step to the next frame: what touches or passes through. All de
 
 Contacts assume that each vertex moves in a straight line from frame to frame.
 
-exit status: 0 clean; 1 surfaces touch, intersect or pass through each other; 2 no verdict; 130 interrupted
+exit status: 0 clean; 1 surfaces touch, intersect, pass through or contain each other; 2 no verdict; 130 interrupted
 """
 
 from __future__ import annotations

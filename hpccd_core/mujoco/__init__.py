@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes of MuJoCo's models: all contacts of flexes and geoms, and none dropped at a buffer's end.
+"""Scenes of MuJoCo's models: all contacts of flexes and geoms. No buffer limits their number.
 
 Each flex and each geom that can collide becomes a mesh of its name, or a plane; positions come from `mjData`:
 
