@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..sequences import Frame, FrameSequence
+from ..sequences.splitting import SplitSequence, has_closed_parts
 from .analysis import Options, check_part
 from .report import FrameResult, Report, StepResult
 
@@ -37,9 +38,21 @@ class ClusterError(Exception):
 def report_of(sequence: FrameSequence, options: Options, rows: list[Row], notes: tuple[str, ...] = ()) -> Report:
     """The report of the rows of all frames."""
     frames, steps = [frame for frame, _ in rows], [step for _, step in rows if step is not None]
+    first = sequence.frame(0)
     if frames[0].intersections and not (options.weld or options.changes):
-        notes += _seams(sequence.frame(0))
+        notes += _seams(first)
+    if not isinstance(sequence, SplitSequence):
+        notes += _components(first)
     return Report(sequence.source, frames, steps, sequence.notes + notes, options.separation)
+
+
+def _components(frame: Frame) -> tuple[str, ...]:
+    """A note about meshes of which a component may be inside another one: this is not reported within a mesh."""
+    names = [mesh.name for mesh in frame.meshes if has_closed_parts(mesh)]
+    if not names:
+        return ()
+    what = f"mesh {names[0]} has" if len(names) == 1 else f"mesh {names[0]} and {len(names) - 1} more have"
+    return (f"{what} several connected components; whether one is inside another is only reported with --split",)
 
 
 def _seams(frame: Frame) -> tuple[str, ...]:

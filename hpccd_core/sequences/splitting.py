@@ -4,6 +4,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from ..solids import closed
 from .sequence import FrameSequence, SequenceError, SequenceMesh
 
 _MOST = 64  # components of a mesh: each pair of meshes is a row of the report
@@ -30,6 +31,13 @@ class SplitSequence(FrameSequence):
             self._opened["of"] = frame.meshes
         meshes, order = self._opened["parts"]
         return frame.name, meshes, frame.vertices[order]
+
+
+def has_closed_parts(mesh: SequenceMesh) -> bool:
+    """Whether a mesh has several connected components, not too many to be split, of which one or more are closed."""
+    of_face = _roots(mesh)[mesh.faces[:, 0]]
+    components = np.unique(of_face)
+    return 1 < len(components) <= _MOST and any(closed(mesh.faces[of_face == root]) for root in components)
 
 
 def _parts(where: str, meshes: tuple[SequenceMesh, ...]) -> tuple[tuple[SequenceMesh, ...], NDArray[np.intp]]:

@@ -236,6 +236,20 @@ def test_changed_meshes_are_an_error_or_left_out(tmp_path, capsys):
     assert [mesh["topologies"] for mesh in Page(tmp_path / "page.html").said["meshes"]][0][1]["faces"] == 2
 
 
+def test_components_that_may_be_inside_another_are_a_note(tmp_path, capsys):
+    outer, inner = ([(x, y, z) for x in (0, a) for y in (0, a) for z in (0, a)] for a in (3, 1))
+    box = [(0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7), (0, 5, 1), (0, 4, 5), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4)]
+    box += [(1, 5, 7), (1, 7, 3)]
+    vertices = outer + [(x + 1, y + 1, z + 1) for x, y, z in inner]
+    folder = write_frames(tmp_path, (vertices, box + [tuple(k + 8 for k in face) for face in box]))
+    assert check(folder) == 0
+    assert "several connected components; whether one is inside another is only reported with --split" in (
+        capsys.readouterr().out
+    )
+    assert check(folder, "--split") == 1
+    assert "mesh_0.1 in mesh_0.0" in (out := capsys.readouterr().out) and "whether" not in out
+
+
 def test_weld_joins_doubled_vertices(tmp_path, capsys):
     doubled = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2), (3, 4, 5)]
     torn = [*doubled[0][:3], (1, 0, 1), *doubled[0][4:]], doubled[1]
