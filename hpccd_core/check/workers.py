@@ -194,7 +194,7 @@ def cluster(distributed: Any, scheduler: str | None, jobs: int, most: int) -> It
                 n_workers=processes,
                 threads_per_worker=1,
                 host="127.0.0.1",
-                dashboard_address=None,
+                dashboard_address="127.0.0.1:0",
                 silence_logs=logging.CRITICAL,
             ) as local,
             distributed.Client(local) as client,

@@ -233,7 +233,8 @@ def _draw_scene(axes, image, camera, depth, picture):
     seen = camera.project(picture.points)
     column = np.clip(seen[:, 0].astype(int), 0, depth.shape[1] - 1)
     row = np.clip(seen[:, 1].astype(int), 0, depth.shape[0] - 1)
-    span = np.ptp(depth[np.isfinite(depth)])
+    drawn = depth[np.isfinite(depth)]
+    span = np.ptp(drawn) if len(drawn) else 0.0  # no face has an area
     hidden = seen[:, 2] > depth[row, column] + 0.01 * span
     x, y = seen[:, 0] / SUPERSAMPLING, seen[:, 1] / SUPERSAMPLING
     size = float(np.clip(7000 / len(x), 2.5, 40.0))

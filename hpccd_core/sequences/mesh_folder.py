@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..mesh_files.errors import LONGEST, shortened
 from ..mesh_files.load import FORMATS, MeshFile, load_polygons
 from . import vtk
 from .numbering import arrange
@@ -81,7 +82,8 @@ class MeshFolder(FrameSequence):
         if len(last) != len(meshes) or any(a is not b for a, b in zip(meshes, last, strict=True)):
             self._opened["meshes"] = last = meshes
         moving = [file for file, of_mesh in zip(files, self._files.values(), strict=True) if len(of_mesh) > 1]
-        return ", ".join(self._names[file] for file in moving or files), last, np.concatenate([v for _, v in pairs])
+        label = shortened(", ".join(self._names[file] for file in moving or files), 2 * LONGEST)
+        return label, last, np.concatenate([v for _, v in pairs])
 
     def _mesh(self, name: str, path: Path) -> tuple[SequenceMesh, NDArray[np.float64]]:
         """A mesh, the same object as in the frame before if its topology is the same, and its positions.

@@ -174,3 +174,19 @@ def test_compressed_frames_have_a_limit(tmp_path, monkeypatch):
         open_sequence(tmp_path / "a.npz").frame(0)
     np.savez(tmp_path / "a.npz", vertices=VERTICES[None], faces=FACES)
     assert len(open_sequence(tmp_path / "a.npz").frame(0).vertices) == 4
+
+
+def test_meshes_that_a_picture_cannot_show(tmp_path):
+    """In the middle of the step all vertices are at one point; coordinates are the largest ones."""
+    np.savez(tmp_path / "a.npz", vertices=np.stack([VERTICES * 1e150, VERTICES * -1e150]), faces=FACES)
+    assert check(tmp_path / "a.npz", "--png", tmp_path / "a.png", "--html", tmp_path / "a.html") == 1
+
+
+def test_many_meshes(tmp_path, monkeypatch, capsys):
+    for k in range(30):
+        (tmp_path / f"{chr(97 + k % 26) * (20 + k)}.obj").write_text(malformed.SQUARE.replace(" 0\n", f" {k}\n"))
+    assert check(tmp_path) == 0
+    assert " characters) ..." in (out := capsys.readouterr().out) and len(out) < 1000
+    monkeypatch.setattr("hpccd_core.check.analysis.MOST_MESHES", 29)
+    assert check(tmp_path) == 2
+    assert "has 30 meshes, each pair of which is measured; check at most 29 at once" in capsys.readouterr().err
