@@ -11,7 +11,7 @@ import signal
 import sys
 
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.base.quoting import listed, nearest, quoted
+from hpccd_ros.base.quoting import begun, listed, nearest, quoted
 from hpccd_ros.base.version import package_version
 from hpccd_ros.commands.asking import node_named
 
@@ -138,7 +138,11 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message):
         options = self._option_string_actions
         unknown = [word.partition("=")[0] for word in self._given if word.startswith("--")]
-        near = listed(near for word in unknown if word not in options and (near := nearest(word, options, self.NEAR)))
+        near = listed(
+            near
+            for word in unknown
+            if word not in options and (near := begun(word, options) or nearest(word, options, self.NEAR))
+        )
         meant = f"; did you mean {near}?" if near else ""
         if "--node" in options and (node := node_named(self._given)):
             meant += f"; name the node with --node {node}"

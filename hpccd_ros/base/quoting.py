@@ -45,6 +45,11 @@ def nearest(word: str, names: Iterable[str], similarity: float = 0.6) -> str:
     return near[0] if near else ""
 
 
+def begun(word: str, options: Iterable[str]) -> str:
+    """The first option that ``word`` abbreviates, as --sep does --separation; "": there is none."""
+    return next((option for option in options if len(word) > 3 and option.startswith(word)), "")
+
+
 def suggestion(word: str, names: Iterable[str], similarity: float = 0.6) -> str:
     """ "; did you mean NAME?" with the `nearest` name; "": there is none."""
     near = nearest(word, names, similarity)

@@ -63,6 +63,7 @@ OF_OPTIONS = {
     ("--verison",): "; did you mean --version?\n",
     ("replay",): "the following arguments are required: FILE\n",
     ("replay", "a.mcap", "--rte", "2"): "unrecognized arguments: --rte 2; did you mean --rate?\n",
+    ("replay", "a.mcap", "--acc", "exact"): "unrecognized arguments: --acc exact; did you mean --accuracy?\n",
     ("view", "a.mcap", "--stp=1"): "unrecognized arguments: --stp=1; did you mean --step?\n",
     ("view", "a.mcap", "--frame", "9"): "unrecognized arguments: --frame 9\n",
     ("view", "a.mcap", "a.png"): "unrecognized arguments: a.png; did you mean -o a.png?\n",
