@@ -72,7 +72,7 @@ class MeshFolder(FrameSequence):
     def __init__(self, files: list[Path], source: str) -> None:
         numbered = arrange(files)
         self._files, self._names = numbered.meshes, numbered.names
-        super().__init__(source, numbered.n_frames, numbered.notes, numbered.gaps)
+        super().__init__(source, numbered.n_frames, numbered.notes, numbered.missing)
 
     def _read(self, index: int) -> tuple[str, tuple[SequenceMesh, ...], NDArray[np.float64]]:
         files = [of_mesh[index if len(of_mesh) > 1 else 0] for of_mesh in self._files.values()]

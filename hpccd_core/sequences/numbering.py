@@ -11,7 +11,7 @@ from .sequence import SequenceError
 
 _FRACTION = re.compile(r"(.*[0-9])\.[0-9]+", re.DOTALL)
 _SEPARATORS = " ._-/"
-_MOST_NOTES = 10  # gaps that are listed one by one
+_MOST_NOTES = 10  # places with missing frames that are listed one by one
 
 
 @dataclass(frozen=True)
@@ -24,17 +24,17 @@ class Numbered:
         The files of each mesh in order of their frames; one file only if the mesh is static, or if there is one frame.
     n_frames : int
         The number of frames.
-    gaps : dict of int to int
+    missing : dict of int to int
         The number of frames that are missing right before a frame.
     notes : tuple of str
-        Sentences about gaps and static meshes.
+        Sentences about missing frames and static meshes.
     names : dict of Path to str
         Of each file, its name relative to the folder that contains all files.
     """
 
     meshes: dict[str, list[Path]]
     n_frames: int
-    gaps: dict[int, int]
+    missing: dict[int, int]
     notes: tuple[str, ...]
     names: dict[Path, str]
 
@@ -71,8 +71,8 @@ def arrange(files: list[Path]) -> Numbered:
     elif len(files) > 1:
         notes.append(f"no two files differ in their frame number only: the {len(files)} files are meshes of one frame")
     moving = next((of_mesh for of_mesh in meshes.values() if len(of_mesh) > 1), [])
-    gaps, of_gaps = gaps_between(numbers, [names[file] for file in moving])
-    return Numbered(meshes, max(1, len(numbers)), gaps, (*notes, *of_gaps), names)
+    missing, of_missing = missing_between(numbers, [names[file] for file in moving])
+    return Numbered(meshes, max(1, len(numbers)), missing, (*notes, *of_missing), names)
 
 
 def _relative(files: list[Path]) -> list[str]:
@@ -140,21 +140,21 @@ def _named(found: dict[tuple[str, str], dict[int, Path]]) -> dict[str, list[Path
     }
 
 
-def gaps_between(numbers: list[int], names: list[str]) -> tuple[dict[int, int], list[str]]:
+def missing_between(numbers: list[int], names: list[str]) -> tuple[dict[int, int], list[str]]:
     """(frames missing right before a frame, notes), relative to the most common difference of frame numbers."""
     differences = Counter(b - a for a, b in zip(numbers, numbers[1:], strict=False))
     if not differences or min(differences) < 1:
         return {}, []
     step = min(differences, key=lambda difference: (-differences[difference], difference))
-    gaps, notes = {}, []
+    missing, notes = {}, []
     for k, (a, b) in enumerate(zip(numbers, numbers[1:], strict=False), 1):
-        if (missing := (b - a - 1) // step) > 0:
-            gaps[k] = missing
-            what = f"frame {a + step} is" if missing == 1 else f"frames {a + step} to {a + missing * step} are"
+        if (count := (b - a - 1) // step) > 0:
+            missing[k] = count
+            what = f"frame {a + step} is" if count == 1 else f"frames {a + step} to {a + count * step} are"
             notes.append(f"{what} missing between {names[k - 1]} and {names[k]}")
     if len(notes) > _MOST_NOTES:
-        rest = sum(list(gaps.values())[_MOST_NOTES:])
-        notes[_MOST_NOTES:] = [f"{rest} more frames are missing in {len(notes) - _MOST_NOTES} more gaps"]
+        rest = sum(list(missing.values())[_MOST_NOTES:])
+        notes[_MOST_NOTES:] = [f"{rest} more frames are missing in {len(notes) - _MOST_NOTES} more places"]
     if step > 1:
         notes.insert(0, f"frame numbers increase by {step}")
-    return gaps, notes
+    return missing, notes

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mesh_files.errors import shortened
-from .numbering import gaps_between
+from .numbering import missing_between
 from .packages import needed
 from .sequence import FrameSequence, SequenceError, SequenceMesh
 from .topology import checked_faces, same_or, short_names
@@ -56,8 +56,8 @@ class Recording(FrameSequence):
         static = [name for name in self._meshes if moving and name not in moving]
         notes += [f"{name} has one message: its mesh is the same in all frames" for name in static]
         steps = [frames[0][stamp][2] for stamp in self._stamps]
-        gaps, of_gaps = gaps_between(steps, [self._label(stamp) for stamp in self._stamps])
-        super().__init__(str(path), len(self._stamps), (*notes, *of_gaps), gaps)
+        missing, of_missing = missing_between(steps, [self._label(stamp) for stamp in self._stamps])
+        super().__init__(str(path), len(self._stamps), (*notes, *of_missing), missing)
 
     @contextlib.contextmanager
     def _errors(self) -> Iterator[None]:

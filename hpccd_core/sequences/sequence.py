@@ -81,8 +81,8 @@ class FrameSequence(ABC):
     n_frames : int
         The number of frames, at least 1.
     notes : tuple of str
-        Sentences for a report: units, transforms, gaps, number formats.
-    gaps : dict of int to int
+        Sentences for a report: units, transforms, missing frames, number formats.
+    missing : dict of int to int
         The number of frames that are missing right before a frame, for frames where some are.
     up : {"x", "y", "z"} or None
         The axis that points up, if the file says so.
@@ -106,7 +106,7 @@ class FrameSequence(ABC):
         source: str,
         n_frames: int,
         notes: tuple[str, ...] = (),
-        gaps: dict[int, int] | None = None,
+        missing: dict[int, int] | None = None,
         up: str | None = None,
     ) -> None:
         if n_frames < 1:
@@ -114,7 +114,7 @@ class FrameSequence(ABC):
         self.source = _encodable(source)
         self.n_frames = n_frames
         self.notes = tuple(map(_encodable, notes))
-        self.gaps = gaps or {}
+        self.missing = missing or {}
         self.up = up
 
     def __len__(self) -> int:

@@ -22,7 +22,7 @@ class SplitSequence(FrameSequence):
     def __init__(self, whole: FrameSequence) -> None:
         self._whole = whole
         note = "connected components are meshes of their own; vertices of no face are left out"
-        super().__init__(whole.source, whole.n_frames, (*whole.notes, note), whole.gaps, whole.up)
+        super().__init__(whole.source, whole.n_frames, (*whole.notes, note), whole.missing, whole.up)
 
     def _read(self, index: int) -> tuple[str, tuple[SequenceMesh, ...], NDArray[np.float64]]:
         frame = self._whole.frame(index)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Folders, patterns and lists of mesh files: order, gaps, several meshes, topology from frame to frame."""
+"""Folders, patterns and lists of mesh files: order, missing frames, several meshes, topology from frame to frame."""
 
 import multiprocessing
 import pickle
@@ -63,7 +63,7 @@ def test_one_folder_a_frame(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "numbers, gaps, notes",
+    "numbers, missing, notes",
     [
         ([0, 1, 2, 3], {}, ()),
         ([5, 10, 15, 20], {}, ("frame numbers increase by 5",)),
@@ -74,16 +74,16 @@ def test_one_folder_a_frame(tmp_path):
         ([4], {}, ()),
     ],
 )  # fmt: skip
-def test_gaps_are_named(numbers, gaps, notes, tmp_path):
+def test_missing_frames_are_named(numbers, missing, notes, tmp_path):
     write(tmp_path, *(f"f{number}.obj" for number in numbers))
     sequence = open_sequence(tmp_path)
-    assert (sequence.gaps, sequence.notes) == (gaps, notes)
+    assert (sequence.missing, sequence.notes) == (missing, notes)
 
 
-def test_many_gaps_are_summed_up(tmp_path):
+def test_many_missing_frames_are_summed_up(tmp_path):
     write(tmp_path, *(f"f{k}.obj" for k in range(60) if k % 3))
     notes = open_sequence(tmp_path).notes
-    assert len(notes) == 11 and notes[-1] == "9 more frames are missing in 9 more gaps"
+    assert len(notes) == 11 and notes[-1] == "9 more frames are missing in 9 more places"
 
 
 def test_several_meshes_a_frame(tmp_path):

@@ -16,7 +16,7 @@ def test_frames_are_bit_identical_in_all_formats(form, tmp_path):
     shape, faces = planted.positions(), planted.faces()
     paths, options = planted.WRITERS[form](tmp_path, shape)
     sequence = open_sequence(paths, **options)
-    assert len(sequence) == planted.N_FRAMES and sequence.gaps == {}
+    assert len(sequence) == planted.N_FRAMES and sequence.missing == {}
     expected = np.concatenate([shape[name] for name in planted.NAMES], axis=1)
     first = sequence.frame(0).meshes
     for k in (*range(planted.N_FRAMES), 3, 100):

@@ -108,7 +108,7 @@ def test_a_recording_of_the_node():
     pytest.importorskip("mcap_ros2", reason="recordings need the extra check")
     sequence = open_sequence(ROOT / "bags/cloth-drop-small.mcap")
     first = sequence.frame(0)
-    assert len(sequence) == 90 and sequence.gaps == {}
+    assert len(sequence) == 90 and sequence.missing == {}
     assert [(mesh.name, mesh.n_vertices, len(mesh.faces)) for mesh in first.meshes] == [
         ("ball", 92, 180), ("cloth", 484, 882)]  # fmt: skip
     assert sequence.frame(89).meshes is first.meshes
@@ -155,12 +155,12 @@ def test_a_topology_that_changes_in_a_recording(tmp_path):
     assert found[2].meshes is not found[1].meshes and np.array_equal(frames(sequence)[:, 49:], shape["probe"])
 
 
-def test_gaps_of_a_recording_are_those_of_its_steps(tmp_path):
+def test_missing_frames_of_a_recording_are_those_of_its_steps(tmp_path):
     pytest.importorskip("mcap_ros2", reason="recordings need the extra check")
     shape = {name: planted.positions([])[name][:4] for name in ("cloth", "probe")}
     planted.write_recording(tmp_path / "a.mcap", shape, steps=[3, 4, 7, 8])
     sequence = open_sequence(tmp_path / "a.mcap")
-    assert sequence.gaps == {2: 2} and "frames 5 to 6 are missing" in sequence.notes[-1]
+    assert sequence.missing == {2: 2} and "frames 5 to 6 are missing" in sequence.notes[-1]
 
 
 def test_parameters_of_the_node_that_need_replay(tmp_path):
