@@ -43,7 +43,11 @@ def report_of(sequence: FrameSequence, options: Options, rows: list[Row], notes:
         notes += _seams(first)
     if not isinstance(sequence, SplitSequence):
         notes += _components(first)
-    return Report(sequence.source, frames, steps, sequence.notes + notes, options.separation)
+    separation = options.separation
+    if separation and len(first.meshes) == 1 and not options.changes:
+        separation = 0.0
+        notes += ("the separation has no effect: it is that of different meshes, and the sequence has one mesh",)
+    return Report(sequence.source, frames, steps, sequence.notes + notes, separation)
 
 
 def _components(frame: Frame) -> tuple[str, ...]:

@@ -250,6 +250,16 @@ def test_components_that_may_be_inside_another_are_a_note(tmp_path, capsys):
     assert "mesh_0.1 in mesh_0.0" in (out := capsys.readouterr().out) and "whether" not in out
 
 
+def test_a_separation_within_one_mesh_has_no_effect_and_a_note(tmp_path, capsys):
+    strip = (
+        [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0), (0, 2, 0), (1, 2, 0)],
+        [(0, 1, 2), (1, 3, 2), (2, 3, 4), (3, 5, 4)],
+    )
+    assert check(write_frames(tmp_path, strip, strip), "--separation", 2) == 0
+    out = capsys.readouterr().out
+    assert "note: the separation has no effect" in out and "within" not in out
+
+
 def test_weld_joins_doubled_vertices(tmp_path, capsys):
     doubled = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2), (3, 4, 5)]
     torn = [*doubled[0][:3], (1, 0, 1), *doubled[0][4:]], doubled[1]
