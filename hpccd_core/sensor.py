@@ -37,8 +37,8 @@ class ContactReading:
         Unit vector from the other surface to the group at the nearest pair; zero where there is none, or where the
         distance is 0. Of several nearest pairs the first in canonical order counts.
     pressures : ndarray or Tensor, shape (W, G), float64
-        Sum over all pairs of max(0, 1 - distance / max_distance), in steps of 2**-32: a continuous measure of how
-        much surface is how near. It is not a force: no mass, stiffness or impulse goes into it.
+        Sum over all pairs of max(0, 1 - distance / max_distance), in steps of 2**-32: a continuous measure of
+        how much surface is near. It is not a force: it does not depend on mass, stiffness or impulse.
     """
 
     counts: Any
@@ -66,7 +66,7 @@ class ContactSensor:
     Raises
     ------
     TypeError, ValueError
-        For other arguments.
+        If an argument is invalid.
     ModuleNotFoundError
         If results stay on the device and PyTorch is not installed.
 
