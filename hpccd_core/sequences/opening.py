@@ -36,7 +36,8 @@ def open_sequence(
     Returns
     -------
     FrameSequence
-        Its ``frame(k)`` has the positions (V, 3) float64 and the faces (F, 3) uint32 of each mesh.
+        Each frame (``frame(k)``, or in a loop) has the positions (V, 3) float64 and the faces (F, 3) uint32 of each
+        mesh.
 
     Raises
     ------
@@ -76,7 +77,7 @@ def open_sequence(
     >>> for number in (1, 2, 10):
     ...     _ = (folder / f"sheet_{number}.obj").write_text(f"v 0 0 {number}\\nv 1 0 0\\nv 0 1 0\\nf 1 2 3\\n")
     >>> sequence = open_sequence(folder)
-    >>> [sequence.frame(k).name for k in range(len(sequence))]
+    >>> [frame.name for frame in sequence]
     ['sheet_1.obj', 'sheet_2.obj', 'sheet_10.obj']
     >>> sequence.notes
     ('frames 3 to 9 are missing between sheet_2.obj and sheet_10.obj',)

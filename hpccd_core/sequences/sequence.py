@@ -120,6 +120,9 @@ class FrameSequence(ABC):
     def __len__(self) -> int:
         return self.n_frames
 
+    def __iter__(self) -> Iterator[Frame]:
+        return (self.frame(index) for index in range(self.n_frames))
+
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "_of_thread"}
 
