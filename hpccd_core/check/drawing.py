@@ -101,7 +101,7 @@ def write_picture(sequence: FrameSequence, options: Options, report: Report, pat
         no_points if contacts is None else np.asarray(contacts.points).reshape(-1, 3) @ turn.T,
         np.empty(0) if contacts is None else _times(contacts),
         _title(state.frame.index, report),
-        _facts(state.frame.index, report),
+        [*_facts(state.frame.index, report), *_inside(state.frame.index, report)],
         Path(report.source).name,
         intersecting=np.concatenate(drawn.marked()),
         contours=drawn.contours(turn),
@@ -205,11 +205,8 @@ class SequencePage:
         return vertex_face, len(kept) - vertex_face
 
     def _notices(self, index: int, drawn: int) -> list[str]:
-        frame = self._report.frames[index]
         step = self._report.steps[index - 1] if index else None
-        notices = [f"{inner} is inside {outer}." for inner, outer in frame.inside[:3]]
-        if len(frame.inside) > 3:
-            notices.append(f"{len(frame.inside) - 3} more meshes are inside another.")
+        notices = [f"{sentence}." for sentence in _inside(index, self._report)]
         if step is not None and step.contacts is None:
             notices.append("The step to this frame was not checked, because meshes changed.")
         if step is not None and step.contacts and step.contacts > drawn:
@@ -291,6 +288,13 @@ def _facts(index: int, report: Report) -> list[str]:
         f"separation {report.separation:g}" if report.separation else "",
     ]
     return [fact for fact in facts if fact]
+
+
+def _inside(index: int, report: Report) -> list[str]:
+    """Sentences about meshes inside another one, at most four."""
+    found = report.frames[index].inside
+    more = [f"{len(found) - 3} more meshes are inside another"] if len(found) > 3 else []
+    return [*(f"{shortened(inner, 60)} is inside {shortened(outer, 60)}" for inner, outer in found[:3]), *more]
 
 
 def _history(report: Report, index: int) -> picture.History | None:

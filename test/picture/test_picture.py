@@ -286,7 +286,7 @@ def test_a_spike_beyond_the_axis_is_named():
 def test_a_recording_without_contacts_says_so():
     history = contacts.History(np.arange(5), np.zeros(5, int), np.ones(5), 3)
     *_, curve = contacts.compose(picture_of(np.zeros((0, 3)), []), history, size=(320, 200)).axes
-    assert [text.get_text() for text in curve.texts] == ["No contacts in any of the 5 steps."]
+    assert [text.get_text() for text in curve.texts] == ["No contacts in any step."]
 
 
 TETRAHEDRON = np.array([[0, 0, -0.2], [0.3, 0, -1], [-0.2, 0.3, -1], [-0.2, -0.3, -1.0]])
