@@ -28,8 +28,8 @@ def plot(
     Parameters
     ----------
     contacts : Contacts
-        Of one step, of a detector with outputs=("points",), or ("points", "normals") for arrows. Of many worlds give
-        one: ``contacts.world(k)``.
+        Those of one step, from a detector with outputs=("points",), or ("points", "normals") for arrows. With many
+        worlds, give those of one: ``contacts.world(k)``.
     vertices : Positions, shape (V, 3)
         Positions at which the meshes are drawn, such as those at the end of the step.
     faces : ArrayLike, shape (F, 3), integers, optional
@@ -136,7 +136,7 @@ def _in_polyscope(contacts: Contacts, x: NDArray[np.float64], triangles: NDArray
 
 
 def _length(x: NDArray[np.float64]) -> float:
-    """Of arrows."""
+    """The length of arrows."""
     return 0.04 * float(np.linalg.norm(np.ptp(x, axis=0))) or 1.0
 
 

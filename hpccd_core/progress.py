@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Progress on stderr, so that a wait of seconds is explained; silent where nobody looks."""
+"""Progress on stderr, so that a wait of seconds is explained; silent if stderr is no terminal."""
 
 from __future__ import annotations
 

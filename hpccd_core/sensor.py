@@ -23,7 +23,7 @@ _UNIT = 2.0**-32  # of sums of pressures: sums of integers do not depend on thei
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ContactReading:
-    """What a sensor measured of W worlds and G groups; W is 1 for a detector without worlds.
+    """The measurements of a sensor, for W worlds and G groups; W is 1 for a detector without worlds.
 
     numpy arrays, or PyTorch tensors on the device for a detector with results="device"; the numbers are the same.
 

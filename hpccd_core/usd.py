@@ -38,7 +38,7 @@ def export_contacts(
     path : path
         A new file, or one to replace: .usda (text), .usdc or .usd.
     contacts : Contacts or sequence of Contacts
-        Of one step, or of T steps, each a time sample. The detector needs outputs=("points", "normals").
+        Those of one step, or of T steps, one for each time sample. The detector needs outputs=("points", "normals").
     time_codes : sequence of float, shape (T,), optional
         Increasing. Where each step is written; by default 0, 1, ..., the number of the frame in which the step starts.
     prim : str
@@ -46,9 +46,9 @@ def export_contacts(
     width : float
         Diameter of the points on the screen, in the unit of the coordinates.
     up_axis : {"Y", "Z"}
-        Of the stage. Positions are written as they are.
+        Upward axis of the stage. Positions are written as they are.
     meters_per_unit : float
-        Of the stage: the unit of the coordinates in metres.
+        Unit of the coordinates in metres, for the stage.
 
     Raises
     ------

@@ -158,7 +158,7 @@ def arrays(result: _Result) -> dict[str, Any]:
     Parameters
     ----------
     result : Contacts, Proximity or Intersections, or DeviceContacts, DeviceProximity or DeviceIntersections
-        Of :meth:`Detector.detect`, :meth:`Detector.proximity` and :meth:`Detector.intersections`.
+        The result of :meth:`Detector.detect`, :meth:`Detector.proximity` or :meth:`Detector.intersections`.
 
     Returns
     -------

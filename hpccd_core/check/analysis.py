@@ -22,7 +22,7 @@ MOST_MESHES = 1_000
 
 @dataclasses.dataclass(frozen=True)
 class Options:
-    """What is checked.
+    """The options of a check.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Checker:
     sequence : FrameSequence
     options : Options
     threads : int
-        Of the core; 0: all cores.
+        Threads of the core; 0: all cores.
     """
 
     def __init__(self, sequence: FrameSequence, options: Options, threads: int = 0) -> None:
@@ -103,7 +103,7 @@ class Checker:
         return self._last
 
     def frame(self, state: State, step: StepResult | None = None) -> FrameResult:
-        """What is wrong in a frame. step: to the next one; if it has no contact, the frame has none either."""
+        """The defects of a frame. step: that to the next one; if it has no contact, the frame has none either."""
         gaps = state.distance.distances(state.x)
         smallest = min((gap.distance for gap in gaps), default=np.inf)
         inside = [pair for gap in gaps for pair in _inside(gap)]
@@ -120,7 +120,7 @@ class Checker:
         return FrameResult(state.frame.index, state.frame.name, count, distance, tuple(inside), near)
 
     def step(self, start: State, end: State) -> tuple[StepResult, Contacts | None]:
-        """What touches in the step between two frames, and the contacts; None where the meshes changed."""
+        """The result of the step between two frames, and its contacts; None where the meshes changed."""
         indices = start.frame.index, end.frame.index
         if start.scene is not end.scene:
             return StepResult(*indices, None, None), None
@@ -142,12 +142,12 @@ def check_part(
     begin, end : int
         Frames.
     threads : int
-        Of the core; 0: all cores.
+        Threads of the core; 0: all cores.
 
     Yields
     ------
     tuple of FrameResult and StepResult
-        Of one frame; without a step for the last frame of the sequence.
+        The results of one frame; None in place of the step after the last frame of the sequence.
 
     Raises
     ------

@@ -329,7 +329,7 @@ def _complain(text: str) -> None:
 
 
 def _discard(stream: TextIO) -> None:
-    """What is left in a stream that cannot be written to would change the exit status when the process ends."""
+    """Data left in a stream that cannot be written to would change the exit status when the process ends."""
     with contextlib.suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 

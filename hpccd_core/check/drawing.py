@@ -65,7 +65,7 @@ class Drawn:
     hits: Intersections | None
 
     def marked(self) -> list[NDArray[np.bool_]]:
-        """Of each mesh, the faces that intersect."""
+        """The faces of each mesh that intersect."""
         faces = self.state.motion.faces
         found = np.zeros(len(faces), bool)
         if self.hits is not None:

@@ -19,7 +19,7 @@ class FrameScene:
     meshes : tuple of SequenceMesh
         As :attr:`Frame.meshes`.
     separation : float
-        Of two different meshes, in the unit of the positions.
+        Separation of two different meshes, in the unit of the positions.
     welded : Frame, optional
         A frame with these meshes; vertices at equal positions in it become one.
 
@@ -30,7 +30,7 @@ class FrameScene:
     apart : Scene
         For distances: pairs of different meshes; of a single mesh, with itself.
     faces : list of (F, 3) uint32
-        Of each mesh, as numbers of its vertices in the scene.
+        Faces of each mesh, as numbers of its vertices in the scene.
     counts : list of int
         Vertices of each mesh in the scene.
     """

@@ -77,7 +77,7 @@ class Report:
     frames : list of FrameResult
     steps : list of StepResult
     notes : tuple of str
-        What was applied (units, transforms, joined vertices) and what is missing.
+        Sentences about units, transforms, joined vertices and missing frames.
     separation : float
         In the unit of the sequence.
     """

@@ -159,7 +159,7 @@ class MujocoScene:
         Parameters
         ----------
         data : mujoco.MjData
-            Of the same model. After ``mj_step`` its positions are those at the start of the step, to which its
+            Data of the same model. After ``mj_step`` its positions are those at the start of the step, to which its
             contacts belong too; ``mj_forward`` computes those of the present state.
 
         Returns

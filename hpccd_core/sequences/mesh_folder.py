@@ -66,7 +66,7 @@ class MeshFolder(FrameSequence):
     files : list of Path
         In any order.
     source : str
-        What was given, for messages.
+        The files, for messages.
     """
 
     def __init__(self, files: list[Path], source: str) -> None:

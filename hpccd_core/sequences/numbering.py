@@ -29,7 +29,7 @@ class Numbered:
     notes : tuple of str
         Sentences about missing frames and static meshes.
     names : dict of Path to str
-        Of each file, its name relative to the folder that contains all files.
+        The name of each file, relative to the folder that contains all files.
     """
 
     meshes: dict[str, list[Path]]
@@ -42,8 +42,8 @@ class Numbered:
 def arrange(files: list[Path]) -> Numbered:
     """Sort files into meshes and frames.
 
-    Of names that differ in numbers only, the number with the most values is that of the frame, and the last one of
-    several such. The rest of a name is the mesh.
+    Where names differ in several numbers, the one with the most values is that of the frame; if several have as many,
+    the last one. The rest of a name is the mesh.
 
     Raises
     ------

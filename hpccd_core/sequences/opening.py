@@ -47,10 +47,10 @@ def open_sequence(
 
     Notes
     -----
-    What each format contains, and what is ignored or rejected:
+    Contents of each format; parts that are ignored or rejected:
 
     - Mesh files (OBJ, PLY, STL and DAE as for :func:`hpccd_core.load_mesh`; VTK, VTU): names differ by the
-      frame number; how many are missing is in ``missing``, relative to the usual difference. Files with other
+      frame number; ``missing`` counts those that are absent, relative to the usual difference. Files with other
       names are other meshes of the same frames, as in ``cloth_0001.obj``, ``body_0001.obj``; a single file beside many
       is a static mesh. A folder may contain other files, but only one of these formats. STL has no vertex numbers:
       corners are joined as in the first frame where that fits. Of VTK: polygons, and the boundaries of tetrahedra.

@@ -177,7 +177,7 @@ _of_copies = threading.local()
 
 
 def _shared(key: tuple[int, int, str]) -> dict[str, Any]:
-    """What all copies of a sequence have opened in this thread."""
+    """The files that all copies of a sequence have opened in this thread."""
     states: dict[tuple[int, int, str], dict[str, Any]] = _of_copies.__dict__.setdefault("states", {})
     states[key] = states.pop(key, {})
     while len(states) > _MOST_OPEN:
