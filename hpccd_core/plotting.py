@@ -13,6 +13,7 @@ from . import arguments
 from .array_types import ArrayLike, Positions
 from .contacts import Contacts
 
+_OF_CONTACTS = ("contacts", "normals")
 _COLOURS = ((0.62, 0.7, 0.8), (0.85, 0.75, 0.6), (0.68, 0.78, 0.66), (0.8, 0.68, 0.74))
 
 
@@ -40,8 +41,8 @@ def plot(
     Returns
     -------
     pyvista.Plotter, or the module polyscope
-        Call its ``show()``. Before that, add what you like. Each mesh has its name; the points of contact are
-        "contacts".
+        Call its ``show()``. Before that, add what you like. Each mesh has its name, or "mesh contacts" where
+        that is taken; the points of contact are "contacts", arrows "normals".
 
     Raises
     ------
@@ -90,7 +91,11 @@ def _meshes(
     offsets = layout.vertex_offsets.tolist()
     for k, (name, begin, end) in enumerate(zip(layout.mesh_names, offsets, offsets[1:], strict=False)):
         own = triangles[(triangles[:, 0] >= begin) & (triangles[:, 0] < end)] - begin
+        if own.size and not 0 <= own.min() <= own.max() < end - begin:
+            bad = own[(own < 0).any(axis=1) | (own >= end - begin).any(axis=1)][0] + begin
+            raise ValueError(f"faces: {bad.tolist()} belongs to several meshes; give those of the scene")
         if begin < end:
+            name = f"mesh {name}" if name in _OF_CONTACTS else name  # libraries replace what has the same name
             yield name, _COLOURS[k % len(_COLOURS)], slice(begin, end), own
 
 

@@ -19,6 +19,7 @@ from .mesh_layout import MeshLayout
 from .proximity import Proximity
 
 _UNIT = 2.0**-32  # of sums of pressures: sums of integers do not depend on their order
+_MOST = 1024  # of a pair: two million of them fit into int64
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -38,7 +39,8 @@ class ContactReading:
         distance is 0. Of several nearest pairs the first in canonical order counts.
     pressures : ndarray or Tensor, shape (W, G), float64
         Sum over all pairs of max(0, 1 - distance / max_distance), in steps of 2**-32: a continuous measure of
-        how much surface is near. It is not a force: it does not depend on mass, stiffness or impulse.
+        how much surface is near. It is not a force: it does not depend on mass, stiffness or impulse. Deep inside a
+        plane or a thick surface, where distances are negative, a pair adds at most 1,024.
     """
 
     counts: Any
@@ -171,7 +173,7 @@ class ContactSensor:
         last = xp.cumsum(counts, 0)
         (some,) = xp.where(counts > 0)
         nearest = last[some] - counts[some]
-        terms = xp.clip(1 - distance[pair] / self.max_distance, 0, None) / _UNIT
+        terms = xp.clip(1 - distance[pair] / self.max_distance, 0, _MOST) / _UNIT
         sums = xp.cumsum(xp.asarray(xp.round(terms), dtype=xp.int64), 0)
         distances = xp.full_like(counts, np.inf, dtype=xp.float64)
         distances[some] = distance[pair[nearest]]
@@ -205,9 +207,14 @@ def _vertices(name: str, group: object, layout: MeshLayout) -> NDArray[np.int64]
     if mesh is not None:
         k = arguments.mesh_number(name, mesh, {m: i for i, m in enumerate(layout.mesh_names)})
         begin, end = (int(x) for x in layout.vertex_offsets[k : k + 2])
-    if indices is None:
+    if mesh is not None and begin == end:
+        raise ValueError(f"{name}: {mesh!r} is a plane, which has no vertices; give the mesh that it touches")
+    if isinstance(group, str):
         return np.arange(begin, end)
-    found = np.atleast_1d(arguments.integers(name, indices)).astype(np.int64)
+    given = arguments.integers(name, indices)
+    if given.ndim != 1:
+        raise TypeError(f"{name}: expected a list of vertices, got {arguments.shown(indices)}; write [0, 1, 2]")
+    found = given.astype(np.int64)
     bad = np.flatnonzero((found < 0) | (found >= end - begin))
     if bad.size:
         where = "scene" if mesh is None else f"mesh {mesh!r}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import importlib
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -90,11 +90,17 @@ def export_contacts(
     True
     """
     Gf, Sdf, Usd, UsdGeom, Vt = _pxr("Gf", "Sdf", "Usd", "UsdGeom", "Vt")
-    steps = [contacts] if isinstance(contacts, Contacts) else list(contacts)
+    given: Any = contacts
+    steps = list(given) if isinstance(given, Iterable) and not hasattr(given, "layout") else [given]
     codes = _time_codes(time_codes, len(steps))
     columns = [_columns(step) for step in steps]
     arguments.choice("up_axis", up_axis, ("Y", "Z"))
     width, unit = arguments.length("width", width), arguments.length("meters_per_unit", meters_per_unit)
+    if not unit:
+        raise ValueError("meters_per_unit: must be greater than 0; give 0.01 for centimetres")
+    if not isinstance(path, str | os.PathLike):
+        raise TypeError(f"path: expected the name of a file, got {type(path).__name__}")
+    arguments.text("prim", prim)
     target = Path(path)
     if target.suffix not in (".usd", ".usda", ".usdc"):
         raise ValueError(f"path: {target.name!r} is no USD file; use the ending .usda, .usdc or .usd")
@@ -158,13 +164,21 @@ def _columns(contacts: Contacts) -> dict[str, NDArray[Any]]:
     }
     floats |= {"toc": toc, "displayColor": colour}
     found: dict[str, NDArray[Any]] = {name: np.ascontiguousarray(a, np.int32) for name, a in integers.items()}
-    return found | {name: np.ascontiguousarray(a, np.float32) for name, a in floats.items()}
+    with np.errstate(over="ignore"):
+        found |= {name: np.ascontiguousarray(a, np.float32) for name, a in floats.items()}
+    if not np.isfinite(found["points"]).all():
+        raise ValueError("contacts: USD stores points as float32, and these are beyond 3.4e38; scale the scene down")
+    return found
 
 
 def _time_codes(given: Sequence[float] | None, n: int) -> list[float]:
     if given is None:
         return [float(k) for k in range(n)]
+    if not isinstance(given, Iterable):
+        raise TypeError(f"time_codes: expected {n} numbers, one for each step, got {type(given).__name__}")
     codes = [arguments.real(f"time_codes[{k}]", code) for k, code in enumerate(given)]
+    if not np.isfinite(codes).all():
+        raise ValueError("time_codes: must be finite")
     if len(codes) != n:
         raise ValueError(f"time_codes: expected {n}, one for each step, got {len(codes)}")
     if not all(a < b for a, b in zip(codes, codes[1:], strict=False)):

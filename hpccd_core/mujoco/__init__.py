@@ -82,6 +82,8 @@ class MujocoScene:
     A flex collides with itself where MuJoCo's `selfcollide` is on. Features of it that are closer than twice its radius
     in the initial state are ignored, as they would always be in contact.
 
+    Sizes, radii and rules of collision are those of the model when the scene is made. Make another one after a change.
+
     Examples
     --------
     A cloth falls on a ball. At the second call it has reached it:
@@ -123,6 +125,7 @@ class MujocoScene:
         tolerance, hulls = arguments.length("tolerance", tolerance), arguments.flag("hulls", hulls)
         self._model = model
         self._options = options
+        self._time = -np.inf
         self.parts: tuple[Part, ...] = (*_chosen(model, "flex", flexes), *_chosen(model, "geom", geoms))
         if not self.parts:
             raise ValueError("model: nothing in it can collide; give the flexes and geoms to use")
@@ -196,14 +199,20 @@ class MujocoScene:
         Returns
         -------
         Contacts
-            The first call returns none. ``detector.reset()`` starts again, for example after ``mj_resetData``.
+            The first call returns none, and so does one whose ``data.time`` is earlier than that of the call before, as
+            after ``mj_resetData`` and where MuJoCo resets a state that is not finite: no motion leads there. Before
+            other jumps call ``detector.reset()``.
 
         Raises
         ------
         TypeError, ValueError
             As for :meth:`vertices`, and if a position is not finite.
         """
-        return self.detector.step(self.vertices(data))
+        positions = self.vertices(data)
+        if data.time < self._time:
+            self.detector.reset()
+        self._time = float(data.time)
+        return self.detector.step(positions)
 
     def _new_name(self, kind: str, number: int) -> str:
         name = mujoco.mj_id2name(self._model, _OBJECTS[kind], number)
@@ -285,14 +294,16 @@ def _chosen(model: Any, kind: str, chosen: Iterable[str | int] | None) -> list[P
         can = getattr(model, f"{kind}_contype") | getattr(model, f"{kind}_conaffinity")
         paired = {*model.pair_geom1.tolist(), *model.pair_geom2.tolist()} if kind == "geom" else set()
         return [(kind, k) for k in range(count) if can[k] or k in paired]
-    if isinstance(chosen, str):
-        raise TypeError(f"{plural}: expected a list of names or numbers, got str; write [{chosen!r}]")
+    if isinstance(chosen, str) or not isinstance(chosen, Iterable):
+        raise TypeError(
+            f"{plural}: expected a list of names or numbers, got {type(chosen).__name__}; write [{chosen!r}]"
+        )
     parts: list[Part] = []
     for entry in chosen:
         if isinstance(entry, str):
             number = int(mujoco.mj_name2id(model, _OBJECTS[kind], entry))
             if number < 0:
-                names = [getattr(model, kind)(k).name for k in range(count)]
+                names = [mujoco.mj_id2name(model, _OBJECTS[kind], k) or "" for k in range(count)]
                 raise ValueError(f"{plural}: there is no {kind} {entry!r}{arguments.did_you_mean(entry, names)}")
         else:
             number = arguments.whole_number(plural, entry, 0, count - 1)

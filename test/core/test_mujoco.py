@@ -253,6 +253,12 @@ def test_rules_and_options_reach_the_detector():
         (lambda m: MujocoScene("a.xml"), TypeError, "model: expected mujoco.MjModel, got str; load one with"),
         (lambda m: MujocoScene(m, geoms=["wal"]), ValueError, "geoms: there is no geom 'wal'; did you mean wall?"),
         (lambda m: MujocoScene(m, flexes="flex2"), TypeError, r"flexes: expected a list .*; write \['flex2'\]"),
+        (lambda m: MujocoScene(m, flexes=["flex"]), ValueError, "flexes: there is no flex 'flex'; did you mean flex2?"),
+        (
+            lambda m: MujocoScene(m, geoms=5),
+            TypeError,
+            r"geoms: expected a list of names or numbers, got int; write \[5\]",
+        ),
         (lambda m: MujocoScene(m, geoms=[9]), ValueError, r"geoms: must lie in \[0, 2\], got 9"),
         (lambda m: MujocoScene(m, geoms=["wall", 0]), ValueError, "geoms: 0 is given twice; list each once"),
         (lambda m: MujocoScene(m, geoms=[], flexes=[]), ValueError, "model: nothing in it can collide; give"),
@@ -274,6 +280,27 @@ def test_errors_name_the_remedy(attempt, kind, message):
     )
     with pytest.raises(kind, match=message):
         attempt(model)
+
+
+@pytest.mark.parametrize("finite", [True, False])
+def test_a_reset_is_no_motion(finite, tmp_path, monkeypatch):
+    """A ball that has fallen through the floor goes back above it, by the user or by MuJoCo."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo's log of the state that is not finite
+    floor = '<geom type="plane" size="1 1 1"/>'
+    model, data = load(floor + '<body pos="0 0 1"><freejoint/><geom size=".1" contype="2"/></body>')
+    adapter, found = MujocoScene(model), []
+    for height in (0.0, -0.5, -2.0):
+        data.qpos[2] += height
+        mujoco.mj_step(model, data)
+        found.append(len(adapter.step(data)))
+    assert found == [0, 0, 1]
+    if finite:
+        mujoco.mj_resetData(model, data)
+    else:
+        data.qpos[0] = np.nan
+    mujoco.mj_step(model, data)
+    assert data.geom_xpos[1, 2] == 1.0
+    assert not len(adapter.step(data)) and not len(adapter.step(data))
 
 
 def test_without_mujoco_the_extra_is_named():

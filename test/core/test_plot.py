@@ -110,6 +110,19 @@ def test_positions_by_mesh_without_faces_and_normals(step, pyvista):
     np.testing.assert_array_equal(drawn(pyvista, plotter, "ball").points, BALL[0])
 
 
+def test_a_mesh_with_the_name_of_what_is_drawn(pyvista):
+    scene = hc.Scene()
+    (sheet, sheet_faces), (ball, ball_faces) = hc.shapes.grid(4, 4), hc.shapes.icosphere(2)
+    scene.add_mesh("contacts", sheet_faces)
+    scene.add_mesh("normals", ball_faces)
+    of_both = hc.Detector(scene, outputs=("points", "normals"))
+    start, end = (np.concatenate([sheet + [0, 0, z], ball]) for z in (1.1, 0.9))
+    plotter = hc.plot(of_both.detect(start, end), end, of_both.faces)
+    assert {"contacts", "normals", "mesh contacts", "mesh normals"} <= set(plotter.actors)
+    with pytest.raises(ValueError, match=r"faces: \[0, 1, 30\] belongs to several meshes; give those of the scene"):
+        hc.plot(of_both.detect(start, end), end, [[0, 1, 30]])
+
+
 def test_import_of_the_core_imports_neither():
     program = "import sys, hpccd_core as hc; hc.plot; print(sorted({'pyvista', 'polyscope', 'vtk'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)

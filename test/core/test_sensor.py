@@ -149,6 +149,9 @@ def test_tensors_give_the_same_numbers():
         ({"groups": {"a": "bal"}}, "groups['a']: no mesh is named 'bal'; the scene has box, ball; did you mean ball?"),
         ({"groups": {"a": ("box", [8])}}, "groups['a']: 8 is no vertex of the mesh 'box', which has 8 vertices"),
         ({"groups": {"a": [-1]}}, "groups['a']: -1 is no vertex of the scene, which has 20 vertices"),
+        ({"groups": {"a": None}}, "groups['a']: expected a list of vertices, got None; write [0, 1, 2]"),
+        ({"groups": {"a": {1, 2}}}, "groups['a']: expected a list of vertices, got {1, 2}"),
+        ({"groups": {"a": slice(2)}}, "groups['a']: expected a list of vertices, got slice"),
         ({"groups": {}}, "groups: expected {name: vertices} with at least one group"),
         ({"max_distance": 0.0}, "max_distance: must be greater than 0"),
         ({"detector": hc.Detector(GRASP.scene, outputs="normals")}, "create it with outputs=('normals', 'weights')"),
@@ -158,3 +161,14 @@ def test_mistakes_are_explained(arguments, message):
     usual = {"detector": hc.Detector(GRASP.scene, outputs=OUTPUTS), "groups": GROUPS, "max_distance": REACH}
     with pytest.raises((TypeError, ValueError), match=re.escape(message)):
         ContactSensor(**usual | arguments)
+
+
+def test_planes_are_no_group_and_depth_has_a_limit():
+    scene, (vertices, faces) = hc.Scene(), hc.shapes.box((1.0, 1.0, 1.0))
+    scene.add_mesh("box", faces, self_collision=False)
+    scene.add_plane("floor")
+    detector = hc.Detector(scene, outputs=OUTPUTS)
+    with pytest.raises(ValueError, match=r"groups\['a'\]: 'floor' is a plane, which has no vertices; give the mesh"):
+        ContactSensor(detector, {"a": "floor"}, 1.0)
+    reading = ContactSensor(detector, {"a": "box"}, 1e-9).read(vertices - [0, 0, 1e6])
+    assert reading.pressures.tolist() == [[8 * 1024.0]] and reading.counts.tolist() == [[8]]

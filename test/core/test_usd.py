@@ -120,6 +120,11 @@ def test_worlds(tmp_path):
         ({"up_axis": "X"}, ValueError, "up_axis: 'X' is not known; use one of Y, Z"),
         ({"time_codes": [1]}, ValueError, "time_codes: expected 4, one for each step, got 1"),
         ({"time_codes": [1, 2, 2, 3]}, ValueError, "time_codes: must increase from step to step"),
+        ({"time_codes": [0, 1, 2, np.nan]}, ValueError, "time_codes: must be finite"),
+        ({"time_codes": 3}, TypeError, "time_codes: expected 4 numbers, one for each step, got int"),
+        ({"meters_per_unit": 0}, ValueError, "meters_per_unit: must be greater than 0"),
+        ({"prim": None}, TypeError, "prim: expected a string, got NoneType"),
+        ({"contacts": None}, TypeError, "contacts: expected hpccd_core.Contacts or several, got NoneType"),
         ({"contacts": [1]}, TypeError, "contacts: expected hpccd_core.Contacts or several, got int"),
         ({"contacts": hc.Contacts.none()}, hc.OutputNotComputed, "outputs=('points',)"),
     ],
@@ -135,3 +140,10 @@ def test_without_usd(tmp_path, steps, monkeypatch):
     monkeypatch.setitem(sys.modules, "pxr", None)
     with pytest.raises(ModuleNotFoundError, match=re.escape("pip install 'hpccd-core[usd]'")):
         export_contacts(tmp_path / "contacts.usda", steps)
+
+
+def test_points_beyond_float32(tmp_path):
+    detector, (start, end) = hc.Detector(scene(), outputs=OUTPUTS), np.stack(frames((1.1, 0.9))) * 1e100
+    contacts = detector.detect(start, end)
+    with pytest.raises(ValueError, match="contacts: USD stores points as float32, .* scale the scene down"):
+        export_contacts(tmp_path / "far.usda", contacts)
