@@ -27,7 +27,7 @@ class FrameResult:
         share no vertex. 0 if they touch, or if a mesh touches itself and nothing intersects, as where it is folded flat
         along an edge. None if there is no such pair.
     inside : tuple of (str, str)
-        Pairs of meshes: a connected component of the first lies inside the second, without touching it.
+        Pairs of meshes that do not touch: a connected component of the first lies inside the second, a closed mesh.
     near : bool
         Whether different meshes are within the separation; `distance` is rounded, this is exact.
     """

@@ -231,11 +231,7 @@ def _draw_scene(axes, image, camera, depth, picture):
     if not len(picture.points):
         return
     seen = camera.project(picture.points)
-    column = np.clip(seen[:, 0].astype(int), 0, depth.shape[1] - 1)
-    row = np.clip(seen[:, 1].astype(int), 0, depth.shape[0] - 1)
-    drawn = depth[np.isfinite(depth)]
-    span = np.ptp(drawn) if len(drawn) else 0.0  # no face has an area
-    hidden = seen[:, 2] > depth[row, column] + 0.01 * span
+    hidden = curves.behind(seen, depth)
     x, y = seen[:, 0] / SUPERSAMPLING, seen[:, 1] / SUPERSAMPLING
     size = float(np.clip(7000 / len(x), 2.5, 40.0))
     late_first = np.argsort(-picture.toc, kind="stable")
@@ -310,7 +306,7 @@ def _say(axes, sentence):
 def _draw_history(axes, history):
     axes.set_facecolor(BACKGROUND)
     if not history.contacts.any():
-        _say(axes, "No contacts in any step.")
+        _say(axes, f"No contacts in any of the {len(history.frames):,} steps.")
         return
     axes.fill_between(history.frames, history.contacts, step="mid", color="#e0668c", alpha=0.35, linewidth=0)
     axes.step(history.frames, history.contacts, where="mid", color="#e0668c", linewidth=1.2)

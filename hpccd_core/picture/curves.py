@@ -29,13 +29,19 @@ def draw(axes: Axes, contours: Sequence[hc.Contour], camera: Camera, depth: np.n
         return
     segments = np.concatenate([np.stack([points[:-1], points[1:]], axis=1) for points in ends])
     seen = camera.project(segments.reshape(-1, 3)).reshape(-1, 2, 3)
-    middle = seen.mean(axis=1)
-    column = np.clip(middle[:, 0].astype(int), 0, depth.shape[1] - 1)
-    row = np.clip(middle[:, 1].astype(int), 0, depth.shape[0] - 1)
-    hidden = middle[:, 2] > depth[row, column] + 0.01 * np.ptp(depth[np.isfinite(depth)])
+    hidden = behind(seen.mean(axis=1), depth)
     for which, alpha in ((hidden, 0.45), (~hidden, 1.0)):
         lines = seen[which, :, :2] / scale
         axes.add_collection(LineCollection(lines, colors=COLOUR, linewidths=1.6, alpha=alpha, capstyle="round"))
+
+
+def behind(places: np.ndarray, depth: np.ndarray) -> np.ndarray:
+    """(n,) bool: which points (n, 3), in pixels and depth, are behind the surface that is drawn there."""
+    column = np.clip(places[:, 0].astype(int), 0, depth.shape[1] - 1)
+    row = np.clip(places[:, 1].astype(int), 0, depth.shape[0] - 1)
+    drawn = depth[np.isfinite(depth)]  # none where faces cover no pixel, as those without area
+    hidden: np.ndarray = places[:, 2] > depth[row, column] + (0.01 * np.ptp(drawn) if len(drawn) else 0.0)
+    return hidden
 
 
 def draw_depths(axes: Axes, depths: Sequence[Depth], camera: Camera, scale: float = 1.0, unit: float = 1.0) -> None:

@@ -166,6 +166,14 @@ def test_page_and_picture_show_the_defects(npz, expected, tmp_path):
     assert (tmp_path / "worst.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_picture_of_faces_without_area(tmp_path):
+    """No face covers a pixel, so no surface hides a contact or a curve."""
+    line = np.array([[(0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0.0)]] * 2)
+    np.savez(tmp_path / "line.npz", a_vertices=line, a_faces=[(0, 1, 2)], b_vertices=line, b_faces=[(1, 2, 3)])
+    assert check(tmp_path / "line.npz", "--png", tmp_path / "a.png", "--html", tmp_path / "a.html") == 1
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_separation_counts_different_meshes(tmp_path):
     """Two squares, 1 apart, whose distance on the way is 0.5."""
     square, faces = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0.0)]), np.array([(0, 1, 2), (0, 2, 3)])
