@@ -306,7 +306,7 @@ def _say(axes, sentence):
 def _draw_history(axes, history):
     axes.set_facecolor(BACKGROUND)
     if not history.contacts.any():
-        _say(axes, f"No contacts in any of the {len(history.frames):,} steps.")
+        _say(axes, "No contacts in any step.")
         return
     axes.fill_between(history.frames, history.contacts, step="mid", color="#e0668c", alpha=0.35, linewidth=0)
     axes.step(history.frames, history.contacts, where="mid", color="#e0668c", linewidth=1.2)
