@@ -9,6 +9,7 @@ from pathlib import Path
 
 from .sequence import SequenceError
 
+_NUMBER = re.compile(r"((?:(?<=[ ._])-)?[0-9]+)")  # frames before the first one, as in f_-2.obj, are negative
 _FRACTION = re.compile(r"(.*[0-9])\.[0-9]+", re.DOTALL)
 _SEPARATORS = " ._-/"
 _MOST_NOTES = 10  # places with missing frames that are listed one by one
@@ -96,7 +97,7 @@ def _reject_fractions(files: dict[str, Path]) -> None:
 
 def _parts(names: list[str]) -> list[tuple[str, int, str]]:
     """(text before the frame number, that number, text after it) of each name; without digits the number is 0."""
-    pieces = [re.split("([0-9]+)", name) for name in names]  # text, digits, text, ...
+    pieces = [_NUMBER.split(name) for name in names]  # text, digits, text, ...
     alike: dict[tuple[str, ...], list[list[str]]] = {}
     for split in pieces:
         alike.setdefault(tuple(split[::2]), []).append(split)

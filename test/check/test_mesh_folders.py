@@ -37,6 +37,8 @@ def names_of(sequence):
         ["frame_0009_v2.obj", "frame_0010_v2.obj", "frame_0011_v2.obj"],
         ["run2_f9.obj", "run2_f10.obj", "run2_f11.obj"],
         ["A1.OBJ", "A2.OBJ"],
+        ["f_-002.obj", "f_-001.obj", "f_001.obj", "f_002.obj"],
+        ["2026-01-9.obj", "2026-01-10.obj"],
     ],
 )
 def test_frames_are_in_the_order_of_their_numbers(names, tmp_path):
