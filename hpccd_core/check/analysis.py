@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import arguments
 from ..contacts import Contacts
 from ..detector import Detector
 from ..proximity import Gap
@@ -38,6 +39,9 @@ class Options:
     separation: float = 0.0
     weld: bool = False
     changes: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "separation", arguments.length("separation", self.separation))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -27,6 +27,7 @@ import io
 import os
 import signal
 import sys
+import threading
 import traceback
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -127,11 +128,12 @@ def run(args: argparse.Namespace) -> int:
         except OSError as error:
             _discard(sys.stdout)
             if not isinstance(error, BrokenPipeError):  # where the reader has gone, the verdict remains
-                raise
+                raise CheckError(f"the result cannot be printed: {error.strerror}; give --json FILE") from error
     except CheckError:
         raise
     except OSError as error:
-        raise CheckError(f"{shortened(error.filename or 'output')}: {error.strerror or error}") from error
+        where = f"{shortened(error.filename)}: " if error.filename else ""
+        raise CheckError(f"{where}{error.strerror or error}; no result is written") from error
     except Exception as error:
         traceback.print_exc()
         raise CheckError("this is an error in the program and no verdict; report it with the lines above") from error
@@ -381,7 +383,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # file names need not be text of the terminal
     args = parser.parse_args(argv)
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that incomplete files are removed
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    if in_main_thread:  # so that incomplete files are removed
+        before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         return run(args)
     except CheckError as error:
@@ -391,4 +395,5 @@ def main(argv: Sequence[str] | None = None) -> int:
         _complain("interrupted")
         return 130
     finally:
-        signal.signal(signal.SIGTERM, before)
+        if in_main_thread:
+            signal.signal(signal.SIGTERM, before)

@@ -4,9 +4,10 @@
 import difflib
 import glob
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from .. import arguments
 from ..mesh_files.errors import shortened
 from . import arrays, gltf, point_caches, recording, usd
 from .mesh_folder import SUFFIXES, MeshFolder, in_folder
@@ -82,14 +83,24 @@ def open_sequence(
     >>> sequence.notes
     ('frames 3 to 9 are missing between sheet_2.obj and sheet_10.obj',)
     """
-    given = [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
+    split = arguments.flag("split", split)
+    given = list(paths) if isinstance(paths, Iterable) and not isinstance(paths, (str, bytes)) else [paths]
     if not given:
         raise SequenceError("paths: no file is given; give a folder, a pattern or files")
-    names = [os.fspath(path) for path in given]
+    names = [_name("paths", path) for path in given]
     source = shortened(names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more")
+    of_faces = None if faces is None else Path(os.path.expanduser(_name("faces", faces)))
     with reading(source):
-        sequence = _opened(names, source, None if faces is None else Path(os.path.expanduser(faces)))
+        sequence = _opened(names, source, of_faces)
     return SplitSequence(sequence) if split else sequence
+
+
+def _name(argument: str, path: object) -> str:
+    if not isinstance(path, (str, os.PathLike)) or not isinstance(name := os.fspath(path), str):
+        raise TypeError(f"{argument}: expected the name of a file as str or Path, got {type(path).__name__}")
+    if not name:
+        raise SequenceError(f"{argument}: a name is empty; give a folder, a pattern or files")
+    return name
 
 
 def _opened(names: list[str], source: str, faces: Path | None) -> FrameSequence:
@@ -149,7 +160,7 @@ def _files(names: list[str]) -> list[Path]:
                 f"{shortened(file)}: unknown format; use one of {', '.join((*SUFFIXES, *WHOLE))}; other files are "
                 "ignored in a folder"
             )
-    return files
+    return list(dict.fromkeys(files))  # patterns may overlap
 
 
 def _nearest(path: Path) -> str:

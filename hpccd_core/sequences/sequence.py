@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import operator
 import os
 import threading
 import uuid
@@ -154,6 +155,10 @@ class FrameSequence(ABC):
         IndexError
             There is no such frame.
         """
+        try:
+            index = operator.index(index)
+        except TypeError:
+            raise TypeError(f"index: expected an integer, got {type(index).__name__}") from None
         if not 0 <= index < self.n_frames:
             raise IndexError(f"index: {index} is not a frame of {self.source}; use 0 to {self.n_frames - 1}")
         with reading(self.source):

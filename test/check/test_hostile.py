@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+import threading
 
 import malformed
 import numpy as np
@@ -15,7 +16,7 @@ import pytest
 from page_parts import Page
 from sources import SOURCES
 
-from hpccd_core.check import command
+from hpccd_core.check import Options, command
 from hpccd_core.sequences import SequenceError, open_sequence
 
 FACES, VERTICES = malformed.FACES, malformed.VERTICES
@@ -190,3 +191,38 @@ def test_many_meshes(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("hpccd_core.check.analysis.MOST_MESHES", 29)
     assert check(tmp_path) == 2
     assert "has 30 meshes, each pair of which is measured; check at most 29 at once" in capsys.readouterr().err
+
+
+def test_a_thread_may_check(folder, capsys):
+    found = []
+    thread = threading.Thread(target=lambda: found.append(check(folder)))
+    thread.start()
+    thread.join()
+    assert found == [0]
+
+
+def test_files_that_are_named_twice_are_one(folder):
+    assert len(open_sequence([folder / "a_1.obj", f"{folder}/*.obj", folder / "a_2.obj"])) == 2
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda _: open_sequence(None), TypeError, "paths: expected the name of a file as str or Path, got NoneType"),
+        (
+            lambda _: open_sequence([b"a.obj"]),
+            TypeError,
+            "paths: expected the name of a file as str or Path, got bytes",
+        ),
+        (lambda _: open_sequence([""]), SequenceError, "paths: a name is empty; give a folder"),
+        (lambda f: open_sequence(f, split="yes"), TypeError, "split: expected True or False, got str"),
+        (lambda f: open_sequence(f, faces=5), TypeError, "faces: expected the name of a file as str or Path, got int"),
+        (lambda f: open_sequence(f).frame(1.0), TypeError, "index: expected an integer, got float"),
+        (lambda f: open_sequence(f).frame(2), IndexError, "index: 2 is not a frame of .*; use 0 to 1"),
+        (lambda _: Options(separation=float("nan")), ValueError, "separation: must be finite and not negative"),
+        (lambda _: Options(separation="x"), TypeError, "separation: expected a number, got str"),
+    ],
+)
+def test_wrong_arguments_are_named(call, error, message, folder):
+    with pytest.raises(error, match=message):
+        call(folder)
