@@ -7,6 +7,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..mesh_files.errors import shortened
 from .sequence import SequenceError
 
 _NUMBER = re.compile(r"((?:(?<=[ ._])-)?[0-9]+)")  # frames before the first one, as in f_-2.obj, are negative
@@ -71,9 +72,20 @@ def arrange(files: list[Path]) -> Numbered:
         notes += [f"{names[meshes[name][0]]} is one file: its mesh is the same in all frames" for name in static]
     elif len(files) > 1:
         notes.append(f"no two files differ in their frame number only: the {len(files)} files are meshes of one frame")
+    if numbered := _apart_by_numbers(meshes):
+        notes.append(
+            f"names differ in several numbers: one counts frames, the others meshes ({shortened(numbered, 100)})"
+        )
     moving = next((of_mesh for of_mesh in meshes.values() if len(of_mesh) > 1), [])
     missing, of_missing = missing_between(numbers, [names[file] for file in moving])
     return Numbered(meshes, max(1, len(numbers)), missing, (*notes, *of_missing), names)
+
+
+def _apart_by_numbers(meshes: dict[str, list[Path]]) -> str:
+    """The names of meshes that differ in numbers only: these could be parts of a time such as 0.25."""
+    texts = {name: _NUMBER.sub("", name) for name, of_mesh in meshes.items() if len(of_mesh) > 1}
+    counts = Counter(texts.values())
+    return ", ".join(name for name, text in texts.items() if counts[text] > 1)
 
 
 def _relative(files: list[Path]) -> list[str]:
