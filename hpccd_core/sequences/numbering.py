@@ -73,8 +73,9 @@ def arrange(files: list[Path]) -> Numbered:
     elif len(files) > 1:
         notes.append(f"no two files differ in their frame number only: the {len(files)} files are meshes of one frame")
     if numbered := _apart_by_numbers(meshes):
+        named = shortened(numbered, 100)
         notes.append(
-            f"names differ in several numbers: one counts frames, the others meshes ({shortened(numbered, 100)})"
+            f"files differ in several numbers: one counts frames, the others are parts of mesh names ({named})"
         )
     moving = next((of_mesh for of_mesh in meshes.values() if len(of_mesh) > 1), [])
     missing, of_missing = missing_between(numbers, [names[file] for file in moving])

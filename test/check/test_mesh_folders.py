@@ -56,7 +56,9 @@ def test_numbered_meshes(form, tmp_path):
     sequence = open_sequence(f"{tmp_path}/*/*.obj" if "/" in form else tmp_path)
     assert len(sequence) == 3
     assert names_of(sequence) == [", ".join(form.format(frame, part) for part in (1, 2)) for frame in (8, 9, 10)]
-    assert sequence.notes[0].startswith("names differ in several numbers: one counts frames, the others meshes (")
+    assert sequence.notes[0].startswith(
+        "files differ in several numbers: one counts frames, the others are parts of mesh names ("
+    )
 
 
 def test_one_folder_a_frame(tmp_path):
