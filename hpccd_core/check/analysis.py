@@ -19,6 +19,10 @@ from .report import FrameResult, StepResult
 
 # Of a frame: time and memory grow with the number of pairs, to 8 s and 0.7 GB for this many.
 MOST_MESHES = 1_000
+# Pairs of vertices within the separation: a step has about 13 contacts for each, of 100 bytes.
+MOST_NEAR = 4_000_000
+# Vertices of which these pairs are counted.
+SAMPLED = 32
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,6 +90,7 @@ class Checker:
         frame, last = self._sequence.frame(index), self._last
         if last is not None and last.frame.meshes is frame.meshes:
             self._last = dataclasses.replace(last, frame=frame, x=last.scene.positions(frame))
+            self._reject_many_near(self._last)
             return self._last
         if last is not None and not self._options.changes:
             raise SequenceError(
@@ -104,7 +109,27 @@ class Checker:
             Detector(of, backend="cpu", threads=self._threads, outputs=("points",)) for of in (scene.scene, scene.apart)
         )
         self._last = State(frame, scene, scene.positions(frame), motion, distance)
+        self._reject_many_near(self._last)
         return self._last
+
+    def _reject_many_near(self, state: State) -> None:
+        """Raises SequenceError if the contacts within the separation would not fit into memory, by an estimate."""
+        x, separation = state.x, self._options.separation
+        if not separation or len(state.scene.counts) < 2:
+            return
+        ends = np.cumsum(state.scene.counts)
+        samples = np.unique(np.linspace(0, len(x) - 1, min(SAMPLED, len(x))).astype(np.intp))
+        near = 0
+        for vertex in samples:
+            within = (np.abs(x - x[vertex]) <= separation).all(axis=1)
+            mesh = int(np.searchsorted(ends, vertex, side="right"))
+            near += int(within.sum() - within[ends[mesh] - state.scene.counts[mesh] : ends[mesh]].sum())
+        pairs = near * len(x) // (2 * len(samples))
+        if pairs > MOST_NEAR:
+            raise SequenceError(
+                f"{state.frame.name}: about {pairs:,} pairs of vertices of different meshes are within the separation "
+                f"{separation:g}; give a smaller one, in the unit of the positions (--separation)"
+            )
 
     def frame(self, state: State, step: StepResult | None = None) -> FrameResult:
         """The defects of a frame. step: that to the next one; if it has no contact, the frame has none either."""

@@ -19,6 +19,7 @@ import pytest
 from page_parts import Page
 from sources import SOURCES
 
+import hpccd_core as hc
 from hpccd_core.check import Options, check_part, command, workers
 from hpccd_core.check.workers import report_of
 from hpccd_core.sequences import open_sequence
@@ -185,6 +186,17 @@ def test_separation_counts_different_meshes(tmp_path):
     assert status == 1 and [bool(step["contacts"]) for step in report["steps"]] == [True, True]
     assert [frame["distance"] for frame in report["frames"]] == [1, 0.5, 1]
     assert check(tmp_path / "two.npz", "--separation", 0.75) == 1
+
+
+def test_a_separation_that_is_too_large_is_a_sentence(tmp_path, capsys):
+    """As where it is given in millimetres for positions in metres: the contacts would not fit into memory."""
+    vertices, faces = hc.shapes.icosphere(24)
+    of_mesh = {name: np.array([vertices + (x, 0, 0)] * 2, np.float32) for name, x in (("a", 0), ("b", 3))}
+    np.savez(tmp_path / "two.npz", a_vertices=of_mesh["a"], a_faces=faces, b_vertices=of_mesh["b"], b_faces=faces)
+    assert check(tmp_path / "two.npz", "--separation", 0.5) == 0
+    assert check(tmp_path / "two.npz", "--separation", 1000) == 2
+    says = f"two.npz[0]: about {len(vertices) ** 2:,} pairs of vertices of different meshes are within the separation"
+    assert says in capsys.readouterr().err
 
 
 def test_separation_leaves_out_distances_within_a_mesh(tmp_path):
