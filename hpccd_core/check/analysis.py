@@ -19,7 +19,7 @@ from .report import FrameResult, StepResult
 
 # Of a frame: time and memory grow with the number of pairs, to 8 s and 0.7 GB for this many.
 MOST_MESHES = 1_000
-# Pairs of vertices within the separation: a step has about 13 contacts for each, of 100 bytes.
+# Pairs of vertices at one position or within the separation: a step has about 13 contacts of 100 bytes for each.
 MOST_NEAR = 4_000_000
 # Vertices of which these pairs are counted.
 SAMPLED = 32
@@ -113,21 +113,25 @@ class Checker:
         return self._last
 
     def _reject_many_near(self, state: State) -> None:
-        """Raises SequenceError if the contacts within the separation would not fit into memory, by an estimate."""
-        x, separation = state.x, self._options.separation
-        if not separation or len(state.scene.counts) < 2:
-            return
-        ends = np.cumsum(state.scene.counts)
+        """Raises SequenceError if the contacts of a frame would not fit into memory, by an estimate."""
+        x, separation, ends = state.x, self._options.separation, np.cumsum(state.scene.counts)
         samples = np.unique(np.linspace(0, len(x) - 1, min(SAMPLED, len(x))).astype(np.intp))
-        near = 0
+        equal = near = 0
         for vertex in samples:
-            within = (np.abs(x - x[vertex]) <= separation).all(axis=1)
             mesh = int(np.searchsorted(ends, vertex, side="right"))
-            near += int(within.sum() - within[ends[mesh] - state.scene.counts[mesh] : ends[mesh]].sum())
-        pairs = near * len(x) // (2 * len(samples))
-        if pairs > MOST_NEAR:
+            apart = np.abs(x - x[vertex]).max(axis=1)
+            equal += int((apart == 0).sum()) - 1
+            apart[ends[mesh] - state.scene.counts[mesh] : ends[mesh]] = np.inf
+            near += int((apart <= separation).sum())
+        equal, near = (count * len(x) // (2 * len(samples)) for count in (equal, near))
+        if equal > MOST_NEAR:
             raise SequenceError(
-                f"{state.frame.name}: about {pairs:,} pairs of vertices of different meshes are within the separation "
+                f"{state.frame.name}: about {equal:,} pairs of vertices are at one position; this frame has collapsed, "
+                "check the others without it"
+            )
+        if near > MOST_NEAR:
+            raise SequenceError(
+                f"{state.frame.name}: about {near:,} pairs of vertices of different meshes are within the separation "
                 f"{separation:g}; give a smaller one, in the unit of the positions (--separation)"
             )
 

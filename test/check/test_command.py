@@ -199,6 +199,14 @@ def test_a_separation_that_is_too_large_is_a_sentence(tmp_path, capsys):
     assert says in capsys.readouterr().err
 
 
+def test_a_collapsed_frame_is_a_sentence(tmp_path, capsys):
+    """As a simulation that failed writes it: each face would touch each other one."""
+    vertices, faces = hc.shapes.icosphere(24)
+    np.savez(tmp_path / "zero.npz", vertices=[vertices, vertices, 0 * vertices], faces=faces)
+    assert check(tmp_path / "zero.npz") == 2
+    assert "zero.npz[2]: about 16,597,441 pairs of vertices are at one position" in capsys.readouterr().err
+
+
 def test_separation_leaves_out_distances_within_a_mesh(tmp_path):
     square, faces = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0.0)]), np.array([(0, 1, 2), (0, 2, 3)])
     np.savez(tmp_path / "one.npz", vertices=[square, square], faces=faces)
