@@ -135,6 +135,8 @@ def run(args: argparse.Namespace) -> int:
         where = f"{shortened(error.filename)}: " if error.filename else ""
         raise CheckError(f"{where}{error.strerror or error}; no result is written") from error
     except Exception as error:
+        if _interrupts:  # libraries turn it into errors of their own while they are imported
+            raise KeyboardInterrupt from error
         traceback.print_exc()
         raise CheckError("this is an error in the program and no verdict; report it with the lines above") from error
     return 0 if all(report.clean for report in reports) else 1
@@ -323,6 +325,14 @@ def _short(row: list[str]) -> list[str]:
     ]
 
 
+_interrupts: list[int] = []
+
+
+def _interrupt(number: int, _: object) -> NoReturn:
+    _interrupts.append(number)
+    raise KeyboardInterrupt
+
+
 def _complain(text: str) -> None:
     try:
         print(f"hpccd-check: {text}", file=sys.stderr, flush=True)
@@ -383,9 +393,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # file names need not be text of the terminal
     args = parser.parse_args(argv)
-    in_main_thread = threading.current_thread() is threading.main_thread()
-    if in_main_thread:  # so that incomplete files are removed
-        before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    _interrupts.clear()
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM):  # so that incomplete files are removed
+            if (handler := signal.getsignal(number)) in (signal.SIG_DFL, signal.default_int_handler):
+                signal.signal(number, _interrupt)
+                before[number] = handler
     try:
         return run(args)
     except CheckError as error:
@@ -395,5 +409,5 @@ def main(argv: Sequence[str] | None = None) -> int:
         _complain("interrupted")
         return 130
     finally:
-        if in_main_thread:
-            signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -14,6 +14,7 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import resource_tracker
 from typing import Any
 
 import numpy as np
@@ -190,19 +191,20 @@ def cluster(distributed: Any, scheduler: str | None, jobs: int, most: int) -> It
     try:
         # On this machine only, and without the web page of Dask. Its logs, such as of processes that end after their
         # scheduler, are not for users: errors are raised here.
-        with (
-            importlib.import_module("dask").config.set(
-                {"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical"}
-            ),
-            distributed.LocalCluster(
-                n_workers=processes,
-                threads_per_worker=1,
-                host="127.0.0.1",
-                dashboard_address="127.0.0.1:0",
-                silence_logs=logging.CRITICAL,
-            ) as local,
-            distributed.Client(local) as client,
-        ):
+        with contextlib.ExitStack() as stack:
+            with _interrupted_later():
+                config = importlib.import_module("dask").config.set(
+                    {"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical"}
+                )
+                stack.enter_context(config)
+                local = distributed.LocalCluster(
+                    n_workers=processes,
+                    threads_per_worker=1,
+                    host="127.0.0.1",
+                    dashboard_address="127.0.0.1:0",
+                    silence_logs=logging.CRITICAL,
+                )
+                client = stack.enter_context(distributed.Client(stack.enter_context(local)))
             starting = False
             yield client, max(1, cores // processes)
     except (*lost, RuntimeError) as error:
@@ -210,6 +212,37 @@ def cluster(distributed: Any, scheduler: str | None, jobs: int, most: int) -> It
             raise
         what = "could not be started" if starting else "were ended"
         raise ClusterError(f"--cluster: processes {what}, perhaps for lack of memory; try fewer jobs") from error
+
+
+@contextlib.contextmanager
+def _interrupted_later() -> Iterator[None]:
+    """A first interrupt comes when the block ends: a half-started cluster prints errors of its own.
+
+    Processes that are started meanwhile, and by threads that are, ignore SIGINT: a terminal sends it to all.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def wait(number: int, _: object) -> None:
+        came.append(number)
+        signal.signal(number, before[signal.Signals(number)])
+
+    for number, handler in before.items():
+        if callable(handler):
+            signal.signal(number, wait)
+    resource_tracker.ensure_running()  # at its start it unblocks SIGINT
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if came:
+            raise KeyboardInterrupt
 
 
 def _rows(sequence: FrameSequence, options: Options, begin: int, end: int, threads: int) -> list[Row]:

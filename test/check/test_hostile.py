@@ -5,9 +5,11 @@ import csv
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 import threading
+import time
 
 import malformed
 import numpy as np
@@ -16,7 +18,7 @@ import pytest
 from page_parts import Page
 from sources import SOURCES
 
-from hpccd_core.check import Options, command
+from hpccd_core.check import Options, command, workers
 from hpccd_core.sequences import SequenceError, open_sequence
 
 FACES, VERTICES = malformed.FACES, malformed.VERTICES
@@ -226,3 +228,29 @@ def test_files_that_are_named_twice_are_one(folder):
 def test_wrong_arguments_are_named(call, error, message, folder):
     with pytest.raises(error, match=message):
         call(folder)
+
+
+def test_an_interrupt_that_a_library_swallows(folder, monkeypatch, capsys):
+    def imported(_):
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(10)
+        except KeyboardInterrupt:
+            raise TypeError("half of the library") from None
+
+    monkeypatch.setattr(command, "_library", imported)
+    assert check(folder) == 130
+    assert capsys.readouterr().err == "hpccd-check: interrupted\n"
+    monkeypatch.undo()
+    assert check(folder) == 0 and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+
+
+def test_the_start_of_a_cluster_is_not_interrupted():
+    """The interrupt comes afterwards, and processes that are started in between do not get it."""
+    program = "import signal; print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))"
+    words, found = [sys.executable, "-c", program], []
+    with pytest.raises(KeyboardInterrupt), workers._interrupted_later():
+        os.kill(os.getpid(), signal.SIGINT)
+        found.append(subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip())
+    assert found == ["True"]
+    assert subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip() == "False"
