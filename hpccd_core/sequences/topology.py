@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..mesh_files.load import FORMATS, load_mesh
 from ..mesh_files.polygons import Polygons
-from .sequence import SequenceError, SequenceMesh
+from .sequence import SequenceError, SequenceMesh, reading
 
 FACE_NAMES = ("faces", "triangles", "f")
 
@@ -75,7 +75,8 @@ def faces_of_file(path: Path, n_vertices: int) -> NDArray[np.uint32]:
     if not path.is_file():
         raise SequenceError(f"{path}: is no file; give a mesh file, .npy or .npz with the faces")
     if suffix in (".npy", ".npz"):
-        return checked_faces(str(path), _array(path), n_vertices)
+        with reading(str(path)):  # errors name this file
+            return checked_faces(str(path), _array(path), n_vertices)
     if suffix not in FORMATS:
         raise SequenceError(f"{path}: is not a file with faces; use one of {', '.join((*FORMATS, '.npy', '.npz'))}")
     vertices, faces = load_mesh(path)

@@ -290,6 +290,21 @@ def npy_of_a_huge_header(folder):
     return [folder / "a.npy"], {}
 
 
+@malformed("f.npz: is damaged")
+def faces_of_objects(folder):
+    np.save(folder / "a.npy", VERTICES[None])
+    np.savez(folder / "f.npz", faces=np.array([None]))
+    return [folder / "a.npy"], {"faces": folder / "f.npz"}
+
+
+@malformed("f.npy: is damaged")
+def damaged_faces(folder):
+    np.save(folder / "a.npy", VERTICES[None])
+    np.save(folder / "f.npy", FACES)
+    (folder / "f.npy").write_bytes((folder / "f.npy").read_bytes()[:-4])
+    return [folder / "a.npy"], {"faces": folder / "f.npy"}
+
+
 # Point caches.
 def cache(name, problem, suffix, data, faces=True):
     def write(folder):
