@@ -78,7 +78,7 @@ def test_on_a_cluster(hpccd, children, recordings, tmp_path):
     children.wait(file.exists, "no scheduler file", PATIENCE)
     address = json.loads(file.read_text())["address"]
     alone = hpccd("replay", *recordings, "--scheduler", address)
-    assert alone.returncode == 2 and "without workers" in alone.stderr
+    assert alone.returncode == 2 and "has no workers" in alone.stderr
     worker = children.start("worker", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard")
     children.wait(lambda: worker.has_printed("Registered to"), "the worker did not register", PATIENCE)
     _check(hpccd("replay", *recordings, "--scheduler", address, "--json", "all.json"), tmp_path)
