@@ -285,7 +285,7 @@ def _write(
     from . import drawing
 
     drawn = (sequences[0], options, reports[0])
-    up = args.up or getattr(sequences[0], "up", None) or "z"
+    up = args.up or sequences[0].up or "z"
     if draft := drafts["png"]:
         drawing.write_picture(*drawn, draft, up)
     if draft := drafts["html"]:

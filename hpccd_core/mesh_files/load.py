@@ -206,11 +206,17 @@ def _check(vertices: NDArray[np.float64], n_faces: int) -> None:
     """Raises MeshFileError if the core would reject the mesh."""
     if not n_faces:
         raise MeshFileError("has no triangles; export the surface, not only points or lines")
+    if found := first_unusable(vertices):
+        vertex, limits = found
+        raise MeshFileError(f"vertex {vertex} is {vertices[vertex].tolist()}; coordinates must {limits}")
+
+
+def first_unusable(vertices: NDArray[np.float64]) -> tuple[int, str] | None:
+    """The first vertex whose coordinates the core would reject, and what coordinates must do; None: there is none."""
     # Two reductions, because they need no further array; NaN passes through both and compares false.
     if -LARGEST_COORDINATE <= float(vertices.min()) and float(vertices.max()) <= LARGEST_COORDINATE:
-        return
+        return None
     finite = np.isfinite(vertices).all(axis=1)
     limits = f"lie in [-{LARGEST_COORDINATE:g}, {LARGEST_COORDINATE:g}]" if finite.all() else "be finite"
     bad = np.abs(vertices).max(axis=1) > LARGEST_COORDINATE if finite.all() else ~finite
-    vertex = int(np.flatnonzero(bad)[0])
-    raise MeshFileError(f"vertex {vertex} is {vertices[vertex].tolist()}; coordinates must {limits}")
+    return int(np.flatnonzero(bad)[0]), limits

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import LARGEST_COORDINATE
 from ..mesh_files.errors import MeshFileError, shortened
+from ..mesh_files.load import first_unusable
 
 if TYPE_CHECKING:
     from typing import Self
@@ -211,7 +211,6 @@ def reading(source: str) -> Iterator[None]:
 
 def _check(name: str, meshes: tuple[SequenceMesh, ...], vertices: NDArray[np.float64]) -> None:
     """Raises SequenceError where a coordinate is not finite or too large."""
-    # Two reductions, because they need no further array; NaN passes through both and compares false.
     if not len(vertices):
         raise SequenceError(f"{name}: has no vertices; export it again")
     if len(vertices) != (n := sum(mesh.n_vertices for mesh in meshes)):
@@ -221,12 +220,10 @@ def _check(name: str, meshes: tuple[SequenceMesh, ...], vertices: NDArray[np.flo
         raise SequenceError(
             f"{name}: has several meshes named {names.most_common(1)[0][0]!r}; give each a name of its own"
         )
-    if -LARGEST_COORDINATE <= float(vertices.min()) and float(vertices.max()) <= LARGEST_COORDINATE:
+    found = first_unusable(vertices)
+    if found is None:
         return
-    finite = np.isfinite(vertices).all(axis=1)
-    limits = f"lie in [-{LARGEST_COORDINATE:g}, {LARGEST_COORDINATE:g}]" if finite.all() else "be finite"
-    bad = np.abs(vertices).max(axis=1) > LARGEST_COORDINATE if finite.all() else ~finite
-    at = int(np.flatnonzero(bad)[0])
+    at, limits = found
     vertex = at
     for mesh in meshes:
         if vertex < mesh.n_vertices:
