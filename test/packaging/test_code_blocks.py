@@ -67,6 +67,7 @@ def blocks(page: Path) -> list[Block]:
 def runs(page: Path) -> list[Run]:
     """The blocks that a reader of the page runs, in order."""
     found = []
+    left_out = set()  # programs of the page, by the names under which others import them
     consoles = "".join(block.text for block in blocks(page) if block.language == "console")
     for number, block in enumerate(blocks(page)):
         if block.language == "console":
@@ -75,7 +76,11 @@ def runs(page: Path) -> list[Run]:
             continue
         named = re.match(r"(?:#|//|<!--) (\w+\.\w+)(?: -->)?\n", block.text)
         file = named.group(1) if named else f"block_{number}.py"
-        if block.language == "python" and usable(block.text) and f"python {file}" not in consoles:
+        imported = set(re.findall(r"^(?:from|import) (\w+)", block.text, re.MULTILINE))
+        can_run = block.language == "python" and usable(block.text) and not imported & left_out
+        if block.language == "python" and not can_run:
+            left_out.add(Path(file).stem)
+        if can_run and f"python {file}" not in consoles:
             found.append(Run(f"python {file}", block.output, file, block.text))
         elif named:
             found.append(Run("", None, file, block.text))
