@@ -89,7 +89,7 @@ def test_a_best_effort_publisher_is_heard_and_n_messages_end_it(start_node, hpcc
 
 def test_a_topic_that_is_not_there(start_node, hpccd):
     node = start_node({"meshes": ["cloth"]})
-    done = hpccd("echo", f"{node.namespace}/contact", "--wait", "5")
+    done = hpccd("echo", f"{node.namespace}/contact", "--wait", "10")
     assert done.returncode == 2 and f"{node.namespace}/contact: no such topic on ROS_DOMAIN_ID" in done.stderr
     assert f"did you mean {node.namespace}/contacts?" in done.stderr
     done = hpccd("echo", "1contacts")

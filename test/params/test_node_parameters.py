@@ -19,10 +19,14 @@ import sys
 from hpccd_ros.middleware import environment
 environment.prepare()
 import rclpy
+from rcl_interfaces.srv import GetParameters, ListParameters
 from hpccd_ros.params import node_parameters
 rclpy.init()
 node = rclpy.create_node("asking")
-print(node_parameters.fetch(node, "/served", float(sys.argv[1]))["number"])
+wait, discovery = (float(argument) for argument in sys.argv[1:])
+for kind, name in ((ListParameters, "list_parameters"), (GetParameters, "get_parameters")):
+    assert node.create_client(kind, f"/served/{name}").wait_for_service(discovery), name
+print(node_parameters.fetch(node, "/served", wait)["number"])
 """
 
 
@@ -46,7 +50,8 @@ def served():
 
 
 def ask(wait):
-    command = [sys.executable, "-c", ASKING, str(wait)]
+    """`wait` begins once the node is discovered, which takes a busy machine longer than 2 s."""
+    command = [sys.executable, "-c", ASKING, str(wait), str(PATIENCE)]
     return subprocess.run(command, capture_output=True, text=True, timeout=2 * PATIENCE)
 
 
@@ -70,7 +75,7 @@ def test_a_slow_node_has_its_time_for_each_request(served):
 
 def delayed(callback):
     def respond(request, response):
-        time.sleep(1.2)
+        time.sleep(1.1)
         return callback(request, response)
 
     return respond
