@@ -36,7 +36,7 @@ class GltfScene(FrameSequence):
         if not with_mesh:
             raise SequenceError(f"{path}: its scene has no meshes; export surfaces")
         names = [str(nodes[k].get("name") or f"node {k}") for k in with_mesh]
-        self._nodes = dict(sorted(zip(_told_apart(names, with_mesh), with_mesh, strict=True)))
+        self._nodes = dict(sorted(zip(_unique_names(names, with_mesh), with_mesh, strict=True)))
         self._channels = self._animations(file)
         self._times = sorted({float(t) for channel in self._channels.values() for t in channel.times})
         built = {name: self._built(name, node) for name, node in self._nodes.items()}
@@ -233,7 +233,7 @@ class GltfScene(FrameSequence):
         return moved
 
 
-def _told_apart(names: list[str], nodes: list[int]) -> list[str]:
+def _unique_names(names: list[str], nodes: list[int]) -> list[str]:
     """The names; those that are not unique have the number of the node behind them."""
     counts = Counter(names)
     taken = {name for name, count in counts.items() if count == 1}
