@@ -153,6 +153,42 @@ def thickness(value: object) -> NDArray[np.float64]:
     return numbers
 
 
+def shape(value: object, used: int, n_vertices: int | None) -> NDArray[np.float64]:
+    """Positions of a mesh in its own frame -> (n, 3) float64, at least one row for each vertex that is used."""
+    positions = reals("shape", value)
+    if positions.ndim != 2 or positions.shape[1] != 3:
+        remedy = "; transpose it: shape.T" if positions.ndim == 2 and positions.shape[0] == 3 else ""
+        raise ValueError(f"shape: expected (n_vertices, 3), the positions of this mesh, got {positions.shape}{remedy}")
+    expected = used if n_vertices is None else whole_number("n_vertices", n_vertices, 0, 2**32 - 2)
+    if len(positions) < used or (n_vertices is not None and len(positions) != expected):
+        raise ValueError(f"shape: expected {expected} rows, one for each vertex of this mesh, got {len(positions)}")
+    bad = np.argwhere(~(np.abs(positions) <= LARGEST_IN_SNAPSHOT))
+    if len(bad):
+        where = tuple(bad[0])
+        raise ValueError(f"shape[{where[0]}, {where[1]}] is {positions[where]}; all coordinates must be finite")
+    return positions
+
+
+def poses(value: object, meshes: Sequence[str], worlds: int | None) -> NDArray[np.float64]:
+    """(K, 7), or of many worlds (W, K, 7): the rows of K meshes; None: no rows, the identity of all."""
+    if value is None:
+        return np.empty((0, 7))
+    array = reals("poses", value)
+    expected = (len(meshes), 7) if worlds is None else (worlds, len(meshes), 7)
+    if array.shape == expected:
+        return np.require(array, None, ["C", "A"])
+    there = ", ".join(meshes) or "none: give shape= to Scene.add_mesh"
+    remedy = ""
+    if array.shape[-2:] == (4, 4):
+        remedy = "; from matrices: position matrix[:3, 3], and the quaternion of matrix[:3, :3]"
+    elif array.shape == (7,) and expected == (1, 7):
+        remedy = "; for one mesh give poses=[pose]"
+    raise ValueError(
+        f"poses: expected shape {expected}, position x y z and quaternion x y z w of each mesh that has a shape and is "
+        f"not static ({there}), got {array.shape}{remedy}"
+    )
+
+
 def real(name: str, value: Any) -> float:
     """The value as float. Raises ValueError if float64 cannot hold it exactly."""
     if isinstance(value, np.float32):
@@ -371,6 +407,17 @@ def vertices(name: str, value: object, shape: tuple[int, ...], layout: MeshLayou
         )
     usable_in_place = array.flags.c_contiguous and array.flags.aligned
     return array if usable_in_place else np.require(array, None, ["C", "A"])
+
+
+def positions_of_others(value: object, shape: tuple[int, ...]) -> NDArray[Any]:
+    """Positions beside poses: of the meshes without a shape, (U, 3) or (W, U, 3), float32 or float64."""
+    array = _reals("vertices", _array("vertices", value), value)
+    if array.shape != shape:
+        raise ValueError(
+            f"vertices: expected shape {shape}: with poses, one row per vertex of the meshes without a shape, in the "
+            f"order added, got {array.shape}"
+        )
+    return np.require(array, None, ["C", "A"])
 
 
 def _is_list_of_meshes(value: object) -> TypeGuard[Sequence[object]]:

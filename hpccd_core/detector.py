@@ -260,6 +260,9 @@ class Detector(
         self._shape = (self.n_vertices, 3) if self.worlds is None else (self.worlds, self.n_vertices, 3)
         self._rows = self.n_vertices * (self.worlds or 1)
         self._layout = scene.layout
+        self._posed = scene._posed_meshes()
+        self._n_others = scene._vertices_without_shape()
+        self._has_static_shapes = self._n_others < self.n_vertices
         self._n_mesh_pairs = scene._n_enabled_pairs()
         self._mesh_numbers = {name: number for number, name in enumerate(self._layout.mesh_names)}
         options = _core.Options()

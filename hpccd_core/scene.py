@@ -58,6 +58,7 @@ class Scene:
         self_collision: bool = True,
         static: bool = False,
         thickness: ArrayLike = 0.0,
+        shape: ArrayLike | None = None,
     ) -> int:
         """Add a mesh and return its number.
 
@@ -80,6 +81,11 @@ class Scene:
             Distance of the surface from the triangles, in the unit of the coordinates: the separation of two features
             is that of their meshes plus the thickness of both. One number, or one for each face; edges and vertices
             have the greatest of their faces. For a mesh without faces, one for each edge.
+        shape : ArrayLike, shape (n_vertices, 3), optional
+            Positions of the mesh in its own frame, if it keeps its shape: then queries of one frame take its pose
+            (:meth:`Detector.distances`) and compute only the positions that they need. With ``static=True`` the mesh
+            has no pose: the shape is where it is. Give ``self_collision=False`` too, unless the mesh may intersect
+            itself.
 
         Returns
         -------
@@ -104,6 +110,9 @@ class Scene:
         self_collision, static = arguments.flag("self_collision", self_collision), arguments.flag("static", static)
         indices, segments = arguments.faces(faces), arguments.edges(edges)
         used = max(int(array.max()) + 1 if array.size else 0 for array in (indices, segments))
+        positions = None if shape is None else arguments.shape(shape, used, n_vertices)
+        if positions is not None:
+            n_vertices = len(positions)
         n_vertices = used if n_vertices is None else arguments.whole_number("n_vertices", n_vertices, 0, _MOST)
         numbers = arguments.thickness(thickness)
         n_elements = len(indices) or len(segments) or n_vertices
@@ -113,6 +122,8 @@ class Scene:
         self._repeat("add_mesh", (name, indices.copy(), n_vertices, self_collision, static, segments.copy()))
         if numbers.any():
             self._repeat("set_thickness", (self._ids[name], numbers.copy()))
+        if positions is not None:
+            self._repeat("set_shape", (self._ids[name], positions.copy()))
         return self._ids[name]
 
     def add_points(
@@ -462,6 +473,17 @@ class Scene:
         vars(self).update(state, _calls=[])
         for name, values in state["_calls"]:
             self._repeat(name, values)
+
+    def _vertices_without_shape(self) -> int:
+        """Number of vertices of the meshes that have no shape."""
+        return self.n_vertices - sum(len(values[1]) for name, values in self._calls if name == "set_shape")
+
+    def _posed_meshes(self) -> list[str]:
+        """Names of the meshes that take a pose, in the order added: with a shape, and not static."""
+        names = self.mesh_names
+        static = {values[0] for name, values in self._calls if name == "add_mesh" and values[4]}
+        shaped = [names[values[0]] for name, values in self._calls if name == "set_shape"]
+        return [name for name in shaped if name not in static]
 
     def _has_points(self) -> bool:
         return any(name == "add_mesh" and len(values) > 6 for name, values in self._calls)

@@ -4,10 +4,10 @@ set(hpccd_sources
   src/base/forks.cpp src/base/parallel.cpp src/base/simd.cpp
   src/base/standard_arithmetic.cpp src/base/thread_affinity.cpp
   src/rigid/c_library.cpp src/rigid/joint_bounds.cpp src/rigid/joint_chain.cpp src/rigid/placed_vertices.cpp
-  src/scene/edges.cpp src/scene/face_adjacency.cpp src/scene/feature_filter.cpp src/scene/features.cpp src/scene/pair_rules.cpp
+  src/scene/edges.cpp src/scene/face_adjacency.cpp src/scene/feature_filter.cpp src/scene/features.cpp src/scene/mesh_poses.cpp src/scene/pair_rules.cpp
   src/scene/scene.cpp src/scene/separation_table.cpp src/scene/thickness.cpp
   src/scene/static_meshes.cpp src/scene/tested_pairs.cpp
-  src/bvh/build.cpp src/bvh/motion_bounds.cpp src/bvh/refit.cpp src/bvh/split.cpp src/bvh/squeezed_axis.cpp
+  src/bvh/build.cpp src/bvh/motion_bounds.cpp src/bvh/placed_meshes.cpp src/bvh/refit.cpp src/bvh/split.cpp src/bvh/squeezed_axis.cpp
   src/detail/patches.cpp
   src/elementary/batch.cpp src/elementary/distance/distance_batch.cpp src/elementary/exact/contact.cpp
   src/elementary/exact/distance.cpp src/elementary/exact/gap_in_motion.cpp
@@ -20,7 +20,7 @@ set(hpccd_sources
   src/traverse/contact_search.cpp src/traverse/drift.cpp src/traverse/far_pairs.cpp src/traverse/fine_boxes.cpp
   src/traverse/leaf_edge_faces.cpp src/traverse/leaf_hulls.cpp src/traverse/leaf_pairs.cpp src/traverse/mesh_pairs.cpp
   src/traverse/less_excess.cpp src/traverse/near_corners.cpp src/traverse/nearest_pairs.cpp
-  src/traverse/pair_pool.cpp src/traverse/snapshot_search.cpp src/traverse/worker.cpp
+  src/traverse/pair_pool.cpp src/traverse/placed_search.cpp src/traverse/snapshot_search.cpp src/traverse/worker.cpp
   src/contacts/canonical.cpp src/contacts/contours.cpp src/contacts/gaps.cpp
   src/contacts/intersection_place.cpp src/contacts/intersections.cpp
   src/contacts/order.cpp src/contacts/parts.cpp src/contacts/places.cpp src/contacts/points.cpp src/contacts/worlds.cpp

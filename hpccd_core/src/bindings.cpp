@@ -269,6 +269,12 @@ auto unlocked(Query&& query) {
   return query();
 }
 
+// Rows of seven numbers: positions and quaternions.
+std::span<const Pose> poses_of(const Array<double>& rows) {
+  static_assert(sizeof(Pose) == 7 * sizeof(double));
+  return {reinterpret_cast<const Pose*>(rows.data()), static_cast<std::size_t>(rows.size()) / 7};
+}
+
 // The result of a query, with its rows where the detector's options require them.
 template <class OnDevice, class OnHost>
 py::dict rows_where_asked(const Detector& d, OnDevice&& on_device, OnHost&& on_host) {
@@ -383,6 +389,12 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
             return s.add_plane(name, {normal, offset}, is_static);
           },
           "name"_a, "normal"_a, "offset"_a, "static"_a)
+      .def(
+          "set_shape",
+          [](Scene& s, std::uint32_t mesh, const Array<double>& vertices) {
+            s.set_shape(mesh, {vertices.data(), static_cast<std::size_t>(vertices.size())});
+          },
+          "mesh"_a, "vertices"_a)
       .def("ignore_pair", &Scene::ignore_pair, "mesh_a"_a, "mesh_b"_a)
       .def("set_accuracy", &Scene::set_accuracy, "mesh_a"_a, "mesh_b"_a, "accuracy"_a)
       .def("set_separation", &Scene::set_separation, "mesh_a"_a, "mesh_b"_a, "separation"_a)
@@ -524,6 +536,31 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
             return to_list(unlocked([&] { return d.distances(vertices.positions); }));
           },
           "vertices"_a)
+      .def(
+          "proximity_at",
+          [](Detector& d, const Array<double>& poses, const GivenPositions& others, double distance) {
+            return to_dict(unlocked([&] { return d.proximity_at(poses_of(poses), distance, others.positions); }));
+          },
+          "poses"_a, "others"_a, "distance"_a)
+      .def(
+          "intersections_at",
+          [](Detector& d, const Array<double>& poses, const GivenPositions& others) {
+            return to_dict(unlocked([&] { return d.intersections_at(poses_of(poses), others.positions); }));
+          },
+          "poses"_a, "others"_a)
+      .def(
+          "distances_at",
+          [](Detector& d, const Array<double>& poses, const GivenPositions& others) {
+            return to_list(unlocked([&] { return d.distances_at(poses_of(poses), others.positions); }));
+          },
+          "poses"_a, "others"_a)
+      .def(
+          "positions_at",
+          [](Detector& d, const Array<double>& poses, const GivenPositions& others) {
+            std::vector<double> x = unlocked([&] { return d.positions_at(poses_of(poses), others.positions); });
+            return hand_over<double>(std::move(x));
+          },
+          "poses"_a, "others"_a)
       .def(
           "winding_numbers",
           [](Detector& d, const GivenPositions& vertices, const GivenPositions& points, std::uint32_t mesh) {

@@ -27,7 +27,7 @@ using Doubles = py::array_t<double, py::array::c_style>;
 constexpr std::size_t many_vertices = 10'000;
 
 // The layout that Python sees: rows of numbers.
-static_assert(sizeof(Vector) == 3 * sizeof(double) && sizeof(Pose) == 7 * sizeof(double));
+static_assert(sizeof(Vector) == 3 * sizeof(double) && sizeof(rigid::Pose) == 7 * sizeof(double));
 
 std::span<const double> numbers(const Doubles& a) { return {a.data(), static_cast<std::size_t>(a.size())}; }
 
@@ -61,7 +61,7 @@ Row row(const char* name, const Doubles& a) {
 
 // The numbers of a joint, as a row of an array.
 struct JointRow {
-  Pose origin;
+  rigid::Pose origin;
   Vector axis;
   double offset;
 };
@@ -79,21 +79,21 @@ std::shared_ptr<JointChain> chain_of(const std::vector<JointKind>& kinds, const 
   return std::make_shared<JointChain>(std::move(joints));
 }
 
-Pose pose_of(const py::object& turn, const py::object& shift) {
+rigid::Pose pose_of(const py::object& turn, const py::object& shift) {
   return {row<Quaternion>("turn", doubles("turn", turn)), row<Vector>("shift", doubles("shift", shift))};
 }
 
 Doubles poses_of(const JointChain& chain, const py::object& values, const py::object& turn, const py::object& shift) {
-  const std::vector<Pose> poses = chain.poses(numbers(doubles("values", values)), pose_of(turn, shift));
+  const std::vector<rigid::Pose> poses = chain.poses(numbers(doubles("values", values)), pose_of(turn, shift));
   Doubles found({poses.size(), std::size_t{7}});
-  std::memcpy(found.mutable_data(), poses.data(), poses.size() * sizeof(Pose));
+  std::memcpy(found.mutable_data(), poses.data(), poses.size() * sizeof(rigid::Pose));
   return found;
 }
 
 Doubles placed(const py::object& given_poses, const std::vector<std::pair<std::size_t, std::size_t>>& meshes,
                const py::object& given_vertices) {
   const Doubles poses = doubles("poses", given_poses), vertices = doubles("vertices", given_vertices);
-  const auto pose_rows = rows<Pose>("poses", poses);
+  const auto pose_rows = rows<rigid::Pose>("poses", poses);
   const auto from = rows<Vector>("vertices", vertices);
   std::vector<LinkMesh> of_links;
   of_links.reserve(meshes.size());

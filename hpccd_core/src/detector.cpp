@@ -20,6 +20,7 @@
 #include "contacts/points.h"
 #include "gpu/results_to_device.h"
 #include "prepared_impl.h"
+#include "scene/mesh_poses.h"
 #include "solid/closed.h"
 
 namespace hpccd {
@@ -307,12 +308,76 @@ struct Detector::Impl {
     });
   }
 
-  void add_places(Intersections& hits, Positions vertices) {
+  // vertices: Positions on the host, or a PositionOf.
+  void add_places(Intersections& hits, const auto& vertices) {
     const Options& o = options();
     if (!o.points && !o.directions) return;
     const Features& features = common.features;
     if (o.directions && !adjacency) adjacency.emplace(features.faces, features.n_vertices);
-    hpccd::add_places(hits, features, backends().on_host(vertices, 0), adjacency ? &*adjacency : nullptr, common.pool);
+    hpccd::add_places(hits, features, vertices, adjacency ? &*adjacency : nullptr, common.pool);
+  }
+
+  // Points are edges in a search.
+  void split_points_of(Contacts& near, Counts& counts) {
+    if (with_points()) {
+      split_points(near);
+      counts["vv_near"] = near.vv.size(), counts["ve_near"] = near.ve.size();
+    }
+    counts["vf_near"] = near.vf.size(), counts["ee_near"] = near.ee.size();
+  }
+
+  // Meshes at poses.
+
+  std::vector<rigid::Pose> checked_poses(std::span<const Pose> poses, Positions others) const {
+    std::size_t n = 0;
+    for (const Scene::Mesh& mesh : common.scene->meshes())
+      if (!mesh.has_shape()) n += mesh.n_vertices;
+    if (others.n != n * options().worlds)
+      throw InvalidArgument("vertices: the meshes without a shape have " + std::to_string(n) + " vertices" +
+                            (options().worlds > 1 ? " in each of " + std::to_string(options().worlds) + " worlds" : "") +
+                            ", but " + std::to_string(others.n) +
+                            " were given; with poses, give those of the meshes without a shape only, in the order "
+                            "added");
+    check_memory("vertices", others);
+    if (others.on_device)
+      throw InvalidArgument("vertices: are in a GPU's memory; copy them to the host, or give the positions of all "
+                            "meshes without poses");
+    return poses_of_meshes(*common.scene, poses, options().worlds);
+  }
+
+  std::vector<double> positions_at(std::span<const rigid::Pose> poses, Positions others) {
+    return call([&] {
+      std::vector<double> all = place_meshes(*common.scene, poses, others, options().worlds, common.pool);
+      profiler().end();
+      return all;
+    });
+  }
+
+  bool all_have_shapes() const {
+    return std::ranges::all_of(common.scene->meshes(),
+                               [](const Scene::Mesh& mesh) { return mesh.has_shape() || mesh.n_vertices == 0; });
+  }
+
+  // placed(cpu, counts): the query of meshes that are placed. given(positions): that of their positions.
+  template <class Placed, class Given>
+  auto at_poses(std::span<const Pose> poses, Positions others, Placed&& placed, Given&& given) {
+    const std::vector<rigid::Pose> of_meshes = checked_poses(poses, others);
+    using Answer = decltype(given(others));
+    if (options().worlds == 1 && !options().results_on_device && !common.planes.any() && all_have_shapes()) {
+      std::optional<Answer> answer = call([&]() -> std::optional<Answer> {
+        CpuBackend& cpu = backends().cpu();
+        if (!cpu.place(of_meshes)) return std::nullopt;
+        Counts counts;
+        std::optional<Answer> a = placed(cpu, counts);
+        profiler().end();
+        last_backend = asked = Backend::cpu;
+        found = counts;
+        return a;
+      });
+      if (answer) return std::move(*answer);
+    }
+    const std::vector<double> positions = positions_at(of_meshes, others);
+    return given(Positions::of(positions));
   }
 
   void note(Backend picked, Backend computed_by, std::uint64_t n_vf, std::uint64_t n_ee) {
@@ -417,11 +482,7 @@ Proximity Detector::proximity(Positions vertices, double distance) {
       return Counts{{"vp_near", planes.add_near(*near, on_host, distance, Outputs::of_proximity(impl_->options()),
                                                 impl_->common.pool)}};
     });
-    if (impl_->with_points()) {
-      split_points(*near);
-      found["vv_near"] = near->vv.size(), found["ve_near"] = near->ve.size();
-    }
-    found["vf_near"] = near->vf.size(), found["ee_near"] = near->ee.size();
+    impl_->split_points_of(*near, found);
     return near;
   }));
 }
@@ -433,7 +494,7 @@ Intersections Detector::intersections(Positions vertices) {
     auto hits = backend.intersections(v);
     if (!hits) return hits;
     found = {{"ef_intersections", hits->ef.size()}};
-    impl_->add_places(*hits, v);
+    impl_->add_places(*hits, impl_->backends().on_host(v, 0));
     return hits;
   });
 }
@@ -508,6 +569,51 @@ std::vector<Gap> Detector::distances(Positions vertices) {
     found = {{"gaps", gaps->size()}};
     return gaps;
   });
+}
+
+Proximity Detector::proximity_at(std::span<const Pose> poses, double distance, Positions others) {
+  const StandardArithmetic arithmetic;
+  impl_->require_results_on_host("proximity_on_device");
+  check_length("distance", distance);
+  return impl_->at_poses(
+      poses, others,
+      [&](CpuBackend& cpu, Counts& counts) {
+        Contacts near = cpu.proximity_at_poses(distance);
+        impl_->split_points_of(near, counts);
+        return as_proximity(std::move(near));
+      },
+      [&](Positions vertices) { return proximity(vertices, distance); });
+}
+
+Intersections Detector::intersections_at(std::span<const Pose> poses, Positions others) {
+  const StandardArithmetic arithmetic;
+  impl_->require_results_on_host("intersections_on_device");
+  return impl_->at_poses(
+      poses, others,
+      [&](CpuBackend& cpu, Counts& counts) {
+        Intersections hits = cpu.intersections_at_poses();
+        counts = {{"ef_intersections", hits.ef.size()}};
+        impl_->add_places(hits, PositionOf([&](std::uint32_t vertex) { return cpu.position_at_poses(vertex); }));
+        return hits;
+      },
+      [&](Positions vertices) { return intersections(vertices); });
+}
+
+std::vector<Gap> Detector::distances_at(std::span<const Pose> poses, Positions others) {
+  const StandardArithmetic arithmetic;
+  return impl_->at_poses(
+      poses, others,
+      [&](CpuBackend& cpu, Counts& counts) {
+        std::vector<Gap> gaps = cpu.distances_at_poses();
+        counts = {{"gaps", gaps.size()}};
+        return gaps;
+      },
+      [&](Positions vertices) { return distances(vertices); });
+}
+
+std::vector<double> Detector::positions_at(std::span<const Pose> poses, Positions others) {
+  const StandardArithmetic arithmetic;
+  return impl_->positions_at(impl_->checked_poses(poses, others), others);
 }
 
 double Detector::separating_translation(Positions vertices, std::uint32_t mesh_a, std::uint32_t mesh_b,

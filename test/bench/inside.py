@@ -5,6 +5,7 @@
   python -m bench inside --parts curves --peers trueform
   python -m bench inside --parts containment
   python -m bench inside --parts penetration
+  python -m bench inside --parts rigid --peers trueform
 
 points: near the surface (1e-6 to 1e-2 of the size), in the box of the mesh, far (2 to 10 sizes), or hard: copies of
 single coordinates of vertices, and points that are a few roundings of single precision away from vertices, edges and
@@ -15,6 +16,10 @@ of the mesh.
 
 penetration: one mesh beside itself. first: without a start. warm: a moved by a thousandth of its size each time, with
 the translation before as the start. A translation is free if intersections and distances of the moved meshes say so.
+
+rigid: two spheres that keep their shape, of a million triangles each. still: the poses of the call before. moving: one
+sphere turns and moves by a hundredth of its size in each call. positions: of both, computed before the call. trueform:
+neighbor_search, and intersection_curves; its tree is made before, and a pose is the transformation of its mesh.
 """
 
 from __future__ import annotations
@@ -29,10 +34,11 @@ import numpy as np
 
 import hpccd_core as hc
 from bench import lab, shapes
+from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.bench.sources import of_scene
 from hpccd_ros.scenes.shapes import torus
 
-PARTS = ("points", "curves", "containment", "penetration")
+PARTS = ("points", "curves", "containment", "penetration", "rigid")
 PEERS = ("trueform", "open3d", "libigl")
 KINDS = ("near", "box", "far", "hard")
 FRAMES = 4  # of a deforming mesh
@@ -75,6 +81,15 @@ COLUMNS = {
         "first, ms": "first_ms",
         "warm, ms": "warm_ms",
     },
+    "rigid": {
+        "spheres": "place",
+        "query": "query",
+        "state": "state",
+        "way": "way",
+        "distance or pairs": "found",
+        "ms": "median_ms",
+        "/ hpccd": "over_hpccd",
+    },
 }
 
 
@@ -106,6 +121,7 @@ def run(args) -> lab.Report:
             "curves": lambda: of_curves(result, args, threads, [peer for peer in peers if hasattr(peer, "curves")]),
             "containment": lambda: of_containment(result, args, threads),
             "penetration": lambda: of_penetration(result, args, threads),
+            "rigid": lambda: of_rigid(result, args, threads, [p for p in peers if hasattr(p, "nearest")]),
         }
         for part in parts:
             ask[part]()
@@ -136,6 +152,15 @@ class TrueForm:
 
     def winding_numbers(self, mesh, points):
         return self._kit.winding_number(mesh, points)
+
+    def posed(self, mesh, pose):
+        matrix = np.eye(4, dtype=self.dtype)
+        matrix[:3, :3], matrix[:3, 3] = Rigid.of(pose[:3], pose[3:]).rotation(), pose[:3]
+        mesh.transformation = matrix
+        return mesh
+
+    def nearest(self, meshes):
+        return float(self._kit.neighbor_search(*meshes)[1][0]) ** 0.5
 
     def curves(self, meshes):
         kit = self._kit
@@ -501,3 +526,50 @@ def penetrating(size: float):
         "armadillo-like": (body + 0.6 * np.ptp(body, axis=0) * (1, 0.2, 0), body, knobbly.faces),
         "armadillo-like, deep": (body + 0.2 * np.ptp(body, axis=0) * (1, 0.2, 0.3), body, knobbly.faces),
     }
+
+
+# Rigid bodies
+
+
+def of_rigid(result, args, threads, peers):
+    """Smallest distance and intersections of two spheres, by poses and by positions."""
+    vertices, faces = hc.shapes.icosphere(max(2, round((args.size * 1_000_000 / 20) ** 0.5)))
+    scene = hc.Scene()
+    scene.add_mesh("still", faces, shape=vertices, static=True, self_collision=False)
+    scene.add_mesh("moved", faces, shape=vertices, self_collision=False)
+    for place, at in (("apart", (3.0, 0.1, 0.2)), ("intersecting", (0.9, 0.1, 0.2))):
+        for state in ("still", "moving"):
+            poses = [pose_number(at, k) for k in range(FRAMES if state == "moving" else 1)]
+            for query in ("distances", "intersections"):
+                ways = ways_of_rigid(scene, vertices, faces, poses, query, threads, peers)
+                ms, found = lab.in_turn(f"{place}, {query}, {state}", ways, args.repeat, clock_of(threads))
+                for way, times in ms.items():
+                    median = float(np.median(times))
+                    of = {"place": place, "query": query, "state": state, "triangles": 2 * len(faces)}
+                    of |= {"threads": threads, "way": way, "median_ms": median, "least_ms": min(times)}
+                    ratio = median / float(np.median(ms["hpccd"]))
+                    result.add(part="rigid", **of, over_hpccd=ratio, found=found[way])
+
+
+def pose_number(at, k: int) -> np.ndarray:
+    """The k-th of a motion."""
+    turn = np.array([0.02 * k, 0.01 * k, 0.03 * k, 1])
+    return np.array([*(np.array(at) + 0.01 * k), *(turn / np.linalg.norm(turn))])
+
+
+def ways_of_rigid(scene, vertices, faces, poses, query, threads, peers) -> dict:
+    found_of = {"distances": lambda gaps: gaps[0].distance, "intersections": lambda hits: len(hits.ef)}[query]
+    ways = {}
+    by_poses, by_positions = (getattr(hc.Detector(scene, threads=threads), query) for _ in range(2))
+    positions = [hc.Detector(scene).positions_at([pose]) for pose in poses]
+    ways["hpccd"] = in_turns(poses, lambda pose: found_of(by_poses(poses=[pose])))
+    ways["hpccd, positions"] = in_turns(positions, lambda x: found_of(by_positions(x)))
+    for peer in peers:
+        meshes = [peer.mesh(vertices.astype(peer.dtype), faces) for _ in range(2)]
+        ask = peer.nearest if query == "distances" else lambda of, peer=peer: len(peer.curves(of))
+
+        def of_pose(pose, peer=peer, meshes=meshes, ask=ask):
+            return ask([meshes[0], peer.posed(meshes[1], pose)])
+
+        ways[peer.name] = in_turns(poses, of_pose)
+    return ways

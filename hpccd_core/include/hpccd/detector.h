@@ -77,6 +77,20 @@ class HPCCD_API Detector {
   /// canonical order is returned. For several worlds, all pairs of the first world, then all of the second, and so on.
   std::vector<Gap> distances(Positions vertices);
 
+  /// The same queries for meshes with a shape (Scene::set_shape), at poses: bit-identical to those of positions_at. If
+  /// all meshes have a shape, a call costs nothing per vertex: nothing is refitted, and only what the search reaches is
+  /// computed, on the CPU. Not so with planes, with several worlds, or where features are below a 100,000th of the
+  /// scene: then the call computes all positions. poses: of the meshes with a shape that are not static, in the order
+  /// added; those of the first world first; none: the identity. others: positions of the meshes without a shape, in
+  /// their order, on the host. Also throws InvalidArgument if the number of poses is another one, if a pose is not
+  /// finite, or if a quaternion is not of length 1 within 1e-3.
+  Proximity proximity_at(std::span<const Pose> poses, double distance, Positions others = {});
+  Intersections intersections_at(std::span<const Pose> poses, Positions others = {});
+  std::vector<Gap> distances_at(std::span<const Pose> poses, Positions others = {});
+  /// The positions of all vertices at these poses, x y z, for all other queries: those of a shape in double precision, by
+  /// the matrix of the quaternion. An identity returns the shape itself.
+  std::vector<double> positions_at(std::span<const Pose> poses, Positions others = {});
+
   /// Winding numbers of points with respect to a mesh, exact at every accuracy. `points`: the same number for each
   /// world, those of the first world first. Throws InvalidArgument if the mesh is unknown, has no faces or is not
   /// closed: each edge of its faces must be in exactly two of them, in opposite directions.

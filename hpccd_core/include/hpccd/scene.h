@@ -49,6 +49,12 @@ struct Plane {
   bool operator==(const Plane&) const = default;
 };
 
+/// Where a mesh with a shape is: a rotation of its shape, then a translation.
+struct Pose {
+  std::array<double, 3> position{0, 0, 0};         ///< translation, in units of the coordinates
+  std::array<double, 4> quaternion{0, 0, 0, 1};    ///< rotation, x y z w; of length 1 within 1e-3, then normalised
+};
+
 /// Pairs of features of one mesh that are ignored because they were near each other at rest.
 struct RestFilter {
   std::vector<double> vertices;  ///< x y z of each vertex of the mesh at rest
@@ -95,6 +101,11 @@ class HPCCD_API Scene {
   /// Throws InvalidArgument if the number of values is another one, or if a value is negative or not finite.
   void set_thickness(std::uint32_t mesh, std::span<const double> thickness);
 
+  /// Sets the shape of a mesh that is moved by poses only: x y z of each of its vertices, for queries with poses
+  /// (Detector::distances and others). A static mesh with a shape never leaves it. Throws InvalidArgument if the number
+  /// of values is another one, if one is not finite or beyond 1e300, or for a plane.
+  void set_shape(std::uint32_t mesh, std::span<const double> vertices);
+
   /// Ignores pairs of features of one mesh with vertices that are joined by at most `rings` edges. 0: pairs that share
   /// a vertex, which are always ignored. Of several calls the largest number counts.
   void ignore_within(std::uint32_t mesh, std::uint32_t rings);
@@ -136,6 +147,9 @@ class HPCCD_API Scene {
     std::uint32_t n_edges;                      ///< number of its edges in edges()
     std::optional<Plane> plane = std::nullopt;  ///< as given to add_plane; its mesh has no vertices
     std::vector<double> thickness = {};         ///< as given to set_thickness; empty: zero
+    std::vector<double> shape = {};             ///< as given to set_shape; empty: none
+    /// Whether its vertices are given by its shape, and by a pose unless it is static.
+    bool has_shape() const { return !shape.empty(); }
   };
   /// All meshes, in the order added.
   const std::vector<Mesh>& meshes() const { return meshes_; }

@@ -22,6 +22,7 @@ class AvailableBackends {
 
   // The backend, for all worlds.
   DetectionBackend& at(Backend backend);
+  CpuBackend& cpu() { return cpu_; }  // for one world
   GpuBackend& gpu() { return gpu_.value(); }
   // Whether the backend exists and its devices have not failed too often.
   bool works(Backend backend) const;

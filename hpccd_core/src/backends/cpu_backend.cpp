@@ -158,6 +158,11 @@ void CpuBackend::begin_motion(Positions t0, Positions t1, Tests tests, MovingTre
 
 void CpuBackend::begin(Search& search) const { begin(search, shared_.tree.motion()); }
 
+void CpuBackend::begin(SnapshotSearch& search, const Snapshot& snapshot) const {
+  begin(search, snapshot.motion);
+  search.placed = snapshot.placed;
+}
+
 void CpuBackend::begin(Search& search, const MotionBounds& motion) const {
   search.geometry = {motion.vertices.data(), shared_.features.edges.data(), shared_.features.faces.data(),
                      motion.kdops.data()};
@@ -232,6 +237,7 @@ void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
   if (method_) bytes += method_->bytes();
   if (mesh_pairs_) bytes += mesh_pairs_->bytes();
   if (containment_) bytes += containment_->bytes() + contained_.bytes();
+  if (placed_) bytes += placed_->bytes() + last_nearest_.capacity() * sizeof(NearestPair);
   for (const Worker& w : workers_) bytes += sizeof(Worker) + w.bytes();
   stats["bytes"] += bytes;
   if (counts_of_worlds_) return counts_of_worlds_->write(stats);
@@ -258,8 +264,38 @@ void CpuBackend::end_world(WorldMemory& memory) {
 // Queries of one snapshot.
 
 std::optional<Contacts> CpuBackend::proximity(Positions vertices, double distance) {
-  ProximitySearch search(shared_.tree.tree(), shared_.rules, shared_.options.simd);
-  begin_proximity(vertices, distance + shared_.common.thickness.most_of_two() * (1 + 1e-15), search);
+  fit_snapshot(vertices, distance + shared_.common.thickness.most_of_two() * (1 + 1e-15));
+  return proximity(fitted(), distance);
+}
+
+std::optional<Intersections> CpuBackend::intersections(Positions vertices) {
+  fit_snapshot(vertices);
+  return intersections(fitted());
+}
+
+std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
+  fit_snapshot(vertices);
+  shared_.tree.find_least_edges();
+  return distances(fitted());
+}
+
+bool CpuBackend::place(std::span<const rigid::Pose> poses) {
+  if (!placed_) placed_ = std::make_unique<PlacedMeshes>(*shared_.scene, shared_.features, shared_.pool);
+  const bool placed = placed_->place(poses);
+  shared_.profiler.mark("bounds");
+  counts_ = {};
+  return placed;
+}
+
+Contacts CpuBackend::proximity_at_poses(double distance) { return proximity(at_poses(), distance); }
+Intersections CpuBackend::intersections_at_poses() { return intersections(at_poses()); }
+std::vector<Gap> CpuBackend::distances_at_poses() { return distances(at_poses()); }
+
+Contacts CpuBackend::proximity(const Snapshot& snapshot, double distance) {
+  ProximitySearch search(snapshot.tree, shared_.rules, shared_.options.simd);
+  begin(search, snapshot);
+  const double with_thickness = distance + shared_.common.thickness.most_of_two() * (1 + 1e-15);
+  search.reach = reach_of(with_thickness, snapshot.motion.box_rounding, snapshot.motion.box_scale);
   search.geometry.separations.uniform = distance;
   search.geometry.separations.thickness = shared_.common.thickness.view();
   counts_.asked[0] = counts_.asked[1] = true;
@@ -267,10 +303,9 @@ std::optional<Contacts> CpuBackend::proximity(Positions vertices, double distanc
   return collect(search, Outputs::of_proximity(shared_.options));
 }
 
-std::optional<Intersections> CpuBackend::intersections(Positions vertices) {
-  fit_snapshot(vertices);
-  IntersectionSearch search(shared_.tree.tree(), shared_.rules, shared_.options.simd);
-  begin(search);
+Intersections CpuBackend::intersections(const Snapshot& snapshot) {
+  IntersectionSearch search(snapshot.tree, shared_.rules, shared_.options.simd);
+  begin(search, snapshot);
   counts_.asked[2] = true;
   walk_tree(search);
   Intersections found = collect_intersections(workers_, search.geometry, order_, shared_.pool);
@@ -279,26 +314,52 @@ std::optional<Intersections> CpuBackend::intersections(Positions vertices) {
   return found;
 }
 
-std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
-  fit_snapshot(vertices);
+std::vector<Gap> CpuBackend::distances(const Snapshot& snapshot) {
   if (!mesh_pairs_) mesh_pairs_.emplace(shared_.rules, shared_.scene->meshes().size());
   if (!containment_) containment_.emplace(*shared_.scene, shared_.features, *mesh_pairs_);
-  NearestPairs nearest(*mesh_pairs_, shared_.rules, &shared_.common.filter.view(), shared_.features,
-                       shared_.tree.motion(), shared_.tree.tree(), shared_.common.thickness);
-  DistanceSearch search(shared_.tree.tree(), shared_.rules, shared_.options.simd, nearest);
-  begin(search);
+  NearestPairs nearest(*mesh_pairs_, shared_.rules, &shared_.common.filter.view(), shared_.features, snapshot.motion,
+                       snapshot.tree, shared_.common.thickness, snapshot.placed);
+  DistanceSearch search(snapshot.tree, shared_.rules, shared_.options.simd, nearest);
+  begin(search, snapshot);
   search.geometry.separations.thickness = shared_.common.thickness.view();
   counts_.asked[0] = counts_.asked[1] = counts_.asked[2] = true;
+  if (snapshot.placed) test_last_nearest(search, *snapshot.placed);
   walk_tree(search);
   std::vector<Gap> gaps = collect_gaps(nearest, search.geometry, shared_.cancellation);
   shared_.profiler.mark("contacts");
-  containment_->decide(gaps, shared_.tree.tree(), shared_.tree.motion(), contained_, shared_.pool);
-  for (std::size_t i = 0; i < gaps.size(); ++i)
-    if (const NearestPair& pair = nearest.found(i); gaps[i].kind != GapKind::none)
+  containment_->decide(gaps, snapshot.tree, snapshot.motion, snapshot.placed, contained_, shared_.pool);
+  last_nearest_.resize(snapshot.placed ? gaps.size() : 0);
+  for (std::size_t i = 0; i < gaps.size(); ++i) {
+    const NearestPair& pair = nearest.found(i);
+    if (snapshot.placed) last_nearest_[i] = pair;
+    if (gaps[i].kind != GapKind::none)
       gaps[i].distance -= search.geometry.separations.thickness_of(pair.kind, pair.first, pair.second);
+  }
   shared_.profiler.mark("containment");
   shared_.cancellation.heed();
   return gaps;
+}
+
+// The nearest pairs of the last poses give the first limits. The result is the same: they are pairs as any others.
+void CpuBackend::test_last_nearest(DistanceSearch& search, PlacedMeshes& placed) {
+  Worker& worker = workers_.front();
+  worker.begin(search);
+  for (std::size_t i = 0; i < last_nearest_.size(); ++i) {
+    const NearestPair& pair = last_nearest_[i];
+    if (!(pair.distance < std::numeric_limits<double>::infinity())) continue;
+    std::array<std::uint32_t, 5> v{};
+    if (pair.kind == Kind::edge_face) {
+      const auto& edge = shared_.features.edges[pair.first];
+      const auto& face = shared_.features.faces[pair.second];
+      v = {edge[0], edge[1], face[0], face[1], face[2]};
+    } else {
+      pair_vertices(search.geometry, pair.kind, pair.first, pair.second, v.data());
+    }
+    placed.fit_vertices(std::span(v).first(pair.kind == Kind::edge_face ? 5 : 4));
+    const auto [mesh_a, mesh_b] = (*mesh_pairs_)[i];
+    const Rule rule = pair.kind == Kind::edge_face ? Rule{} : shared_.rules.rule(mesh_a, mesh_b);
+    worker.test_pairs({&pair.first, 1}, {&pair.second, 1}, pair.kind, rule);
+  }
 }
 
 std::optional<WindingNumbers> CpuBackend::winding_numbers(Positions vertices, Positions points, std::uint32_t mesh) {

@@ -12,6 +12,7 @@
 #include "backends/shortening.h"
 #include "backends/work_counts.h"
 #include "backends/world_memory.h"
+#include "bvh/placed_meshes.h"
 #include "contacts/canonical.h"
 #include "paper/method.h"
 #include "solid/containment.h"
@@ -34,6 +35,13 @@ class CpuBackend final : public DetectionBackend {
   std::optional<Contacts> proximity(Positions vertices, double distance) override;
   std::optional<Intersections> intersections(Positions vertices) override;
   std::optional<std::vector<Gap>> distances(Positions vertices) override;
+  // Meshes at poses, all of which have a shape: by number of mesh. False where place() gives up (bvh/placed_meshes.h).
+  // Then the queries without positions are those of these poses.
+  bool place(std::span<const rigid::Pose> poses);
+  Contacts proximity_at_poses(double distance);
+  Intersections intersections_at_poses();
+  std::vector<Gap> distances_at_poses();
+  Vec3<double> position_at_poses(std::uint32_t vertex) const { return placed_->position(vertex); }
   std::optional<WindingNumbers> winding_numbers(Positions vertices, Positions points, std::uint32_t mesh) override;
   std::optional<SignedDistances> signed_distances(Positions vertices, Positions points, std::uint32_t mesh) override;
   std::optional<double> separating_translation(Positions vertices, std::array<std::uint32_t, 2> meshes,
@@ -61,6 +69,19 @@ class CpuBackend final : public DetectionBackend {
   std::vector<Worker>& workers() { return workers_; }
 
  private:
+  // What a query of one snapshot searches.
+  struct Snapshot {
+    const Tree& tree;
+    const MotionBounds& motion;
+    PlacedMeshes* placed = nullptr;  // of meshes at poses
+  };
+  Snapshot fitted() const { return {shared_.tree.tree(), shared_.tree.motion()}; }
+  Snapshot at_poses() { return {placed_->tree(), placed_->snapshot(), placed_.get()}; }
+  Contacts proximity(const Snapshot& snapshot, double distance);
+  Intersections intersections(const Snapshot& snapshot);
+  std::vector<Gap> distances(const Snapshot& snapshot);
+  void begin(SnapshotSearch& search, const Snapshot& snapshot) const;
+  void test_last_nearest(DistanceSearch& search, PlacedMeshes& placed);
   void begin(Search& search) const;
   void begin(Search& search, const MotionBounds& motion) const;
   void find_earliest(Positions t0, Positions t1, bool time_only);
@@ -114,6 +135,8 @@ class CpuBackend final : public DetectionBackend {
   std::optional<MeshPairs> mesh_pairs_;
   std::optional<Containment> containment_;
   ContainmentMemory contained_;
+  std::unique_ptr<PlacedMeshes> placed_;   // created by the first query with poses
+  std::vector<NearestPair> last_nearest_;  // of that query, by number of the pair of meshes
   // The start of the drift: the numbers of that snapshot and of the tree.
   std::optional<std::pair<std::uint64_t, std::uint64_t>> drift_of_;
   // Kept after a cancelled call: returning the memory of 10 million contacts to the system takes longer than ending the

@@ -68,6 +68,7 @@ class MovingTree {
   void build_anew();
   // Boxes of the motion for these leaves only.
   void fit_leaves(std::span<const std::uint32_t> leaves);
+  void find_least_edges() { hpccd::find_least_edges(kept_.tree); }
   // Boxes of the whole sweep, for methods with their own hierarchy.
   const std::vector<Box>& swept();
 

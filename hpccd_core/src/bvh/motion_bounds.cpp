@@ -79,11 +79,6 @@ void copy_snapshot(const Real* x, const BoxMap& map, const Slanted& slanted, std
   }
 }
 
-// Features smaller than this, in coordinates of the boxes, count as spread: the rounding of a reach, 1e-6, is a tenth
-// of it. For larger features, exact distances cost more than they save: with a vertex 3,000 sizes away from a grid of
-// 5,000 triangles, smallest distances took 16 ms instead of 2.5.
-constexpr double least_spread = 1e-5;
-
 // For each plane of two axes, the direction along which edges extend least, so that slanted bars are separated as well
 // as upright ones. `extents`: by plane and direction. The default directions are kept unless another one is far better:
 // for sheets that are cut into triangles along one diagonal, another one would gain nothing.
@@ -384,6 +379,19 @@ void MotionBounds::update(const Scene& scene, Positions vertices, ThreadPool& po
   resting = statics_.unchanged(scene, vertices, vertices, pool);
   largest_ = largest_in_snapshot, snapshot_ = true, distance_ = distance;
   update_all(vertices, vertices, {}, pool);
+}
+
+void MotionBounds::begin_placed(std::vector<Extent> of_meshes) {
+  extents_ = std::move(of_meshes);
+  Extent whole;
+  for (const Extent& e : extents_) whole.include(e);
+  double most = 0;
+  for (int k = 0; k < 3; ++k) most = std::max({most, std::fabs(whole.low[k]), std::fabs(whole.high[k])});
+  map = CoordinateMap::around(whole.low, whole.high);
+  rounding = box_rounding = 1e-15 * most;
+  box_scale = map.scale;
+  slanted_ = {}, squeezed.clear();
+  snapshot_ = true, spread = grown = false;
 }
 
 void MotionBounds::update(Positions t0, Positions t1, ThreadPool& pool) {

@@ -23,6 +23,11 @@ struct VertexRange {
   std::size_t begin, end;
 };
 
+// Features smaller than this, in coordinates of the boxes, count as spread: the rounding of a reach, 1e-6, is a tenth
+// of it. For larger features, exact distances cost more than they save: with a vertex 3,000 sizes away from a grid of
+// 5,000 triangles, smallest distances took 16 ms instead of 2.5.
+inline constexpr double least_spread = 1e-5;
+
 // Smallest and largest coordinates.
 struct Extent {
   double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
@@ -76,6 +81,9 @@ struct MotionBounds {
   void update(const Scene& scene, Positions vertices, ThreadPool& pool, double distance = 0);
   // Other ends of these vertices, within the boxes that they have.
   void shorten(Positions vertices_t0, Positions vertices_t1, std::span<const std::uint32_t> changed, ThreadPool& pool);
+  // For a snapshot of meshes at poses (bvh/placed_meshes.h): extents that contain them. Positions and boxes of vertices
+  // follow one by one, when they are needed.
+  void begin_placed(std::vector<Extent> of_meshes);
   // The same for vertices without a scene, without separations.
   void update(Positions vertices_t0, Positions vertices_t1, ThreadPool& pool);
   void sweep(ThreadPool& pool);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <atomic>
 #include <cstring>
 
@@ -60,8 +61,9 @@ void fetch_ahead(const Tree& tree, const LeafRange& leaf, const std::vector<Moti
     __builtin_prefetch(&vertex_boxes[tree.corners[c]]);
 }
 
-// Rows are filled four corners at a time, and padded with copies.
-MotionBox leaf_bounds(const Tree& tree, const LeafRange& leaf, const std::vector<MotionBox>& vertex_boxes) {
+// Rows are filled four corners at a time, and padded with copies. box_of(c): the box of corner c of the tree.
+template <class BoxOf>
+MotionBox leaf_bounds(const Tree& tree, const LeafRange& leaf, BoxOf&& box_of) {
   constexpr std::uint32_t t1 = n_bounds / 2, high = 3, n = Tree::coordinates;
   Bounds whole = load(MotionBox());
   CornerRow* rows = tree.rows_of(leaf);
@@ -69,7 +71,7 @@ MotionBox leaf_bounds(const Tree& tree, const LeafRange& leaf, const std::vector
     if (lane == CornerRow::width) lane = 0, rows += tree.rows_per_group();
     const MotionBox* corner[4];
     for (std::uint32_t j = 0; j < 4; ++j) {
-      corner[j] = c + j < leaf.end_corner ? &vertex_boxes[tree.corners[c + j]] : corner[j - 1];
+      corner[j] = c + j < leaf.end_corner ? &box_of(c + j) : corner[j - 1];
       whole = join(whole, load(*corner[j]));
     }
     fill_rows<0>(corner, 0, rows, lane);
@@ -119,7 +121,7 @@ void join_kdops(Tree& tree, const LeafRange& leaf, const std::vector<VertexKdop>
 void fit_leaf(Tree& tree, std::uint32_t number, const MotionBounds& motion) {
   const LeafRange& leaf = tree.leaves[number];
   Node& node = tree.nodes[tree.leaf_nodes[number]];
-  node.box = leaf_bounds(tree, leaf, motion.boxes);
+  node.box = leaf_bounds(tree, leaf, [&](std::uint32_t c) -> const MotionBox& { return motion.boxes[tree.corners[c]]; });
   if (tree.by_kdops) join_kdops(tree, leaf, motion.kdops);
   if (tree.by_kdops && motion.of_any_part) contain_start(tree.kdops[number]);
   if (tree.by_kdops && motion.grown)
@@ -204,6 +206,28 @@ void refit(Tree& tree, const MotionBounds& motion, const std::vector<char>& rest
   tree.area = root > 0 ? area / root : 0;
 }
 
+void fit_leaf(Tree& tree, std::uint32_t number, const MotionBox* corner_boxes) {
+  const LeafRange& leaf = tree.leaves[number];
+  tree.nodes[tree.leaf_nodes[number]].box = leaf_bounds(
+      tree, leaf, [&](std::uint32_t c) -> const MotionBox& { return corner_boxes[c - leaf.first_corner]; });
+}
+
+void find_least_edges(Tree& tree) {
+  if (!tree.least_edge.empty()) return;
+  std::vector<std::uint32_t> least(tree.nodes.size(), Tree::none);
+  for (std::size_t i = tree.nodes.size(); i-- > 0;) {  // children come after their parents
+    const Node& node = tree.nodes[i];
+    if (node.children) {
+      least[i] = std::min(least[node.children], least[node.children + 1]);
+      continue;
+    }
+    const LeafRange& leaf = tree.leaves[node.leaf];
+    for (std::uint32_t slot = leaf.first_edge; slot < leaf.end_edge; ++slot)
+      least[i] = std::min(least[i], tree.edge_of_slot[slot]);
+  }
+  tree.least_edge = std::move(least);
+}
+
 void refit_leaves(Tree& tree, const MotionBounds& motion, std::span<const std::uint32_t> leaves, ThreadPool& pool) {
   constexpr std::size_t grain = 64;
   make_room(tree, motion, pool.cancellation());
@@ -218,7 +242,7 @@ std::size_t Tree::bytes() const {
   return nodes.capacity() * sizeof(Node) + front.capacity() * sizeof(Subtree) +
          above_front.capacity() * sizeof(AboveFront) + leaves.capacity() * (sizeof(LeafRange) + 8) +
          blocks.capacity() * sizeof(Block) + corners_of.capacity() * sizeof(CornersOf) +
-         kdops.capacity() * sizeof(Kdop) + (faces + edges + vertices + corners.capacity()) * 4 +
+         kdops.capacity() * sizeof(Kdop) + (faces + edges + vertices + corners.capacity() + least_edge.capacity()) * 4 +
          n_groups * rows_per_group() * sizeof(CornerRow);
 }
 

@@ -194,6 +194,7 @@ struct Tree {
   HPCCD_HD CornerRow* rows_of(const LeafRange& leaf) const {
     return rows.get() + std::size_t{leaf.first_group} * rows_per_group();
   }
+  std::vector<std::uint32_t> least_edge;  // by node, the lowest number of an edge below; empty until it is needed
   double area = 0;  // sum over nodes, relative to the root's area: the cost of traversal grows with it
   double area_when_built = 0;
 
@@ -210,6 +211,12 @@ void build(Tree& tree, const Scene& scene, const Features& features, const Motio
 // Updates the bounds of the same tree, bottom up (Kim et al. 2009, section 6, parallel BVH update). `resting`: by mesh,
 // whether vertex boxes are unchanged since the previous call; empty: no mesh.
 void refit(Tree& tree, const MotionBounds& motion, const std::vector<char>& resting, ThreadPool& pool);
+
+// Fills Tree::least_edge, once for each tree.
+void find_least_edges(Tree& tree);
+
+// Updates the box and the rows of a leaf for one snapshot, from the boxes of its corners in their order.
+void fit_leaf(Tree& tree, std::uint32_t leaf, const MotionBox* corner_boxes);
 
 // Updates the boxes of some leaves only.
 void refit_leaves(Tree& tree, const MotionBounds& motion, std::span<const std::uint32_t> leaves, ThreadPool& pool);

@@ -44,7 +44,8 @@ class PositionsOfWorld {
 // Volino and Magnenat-Thalmann 2006, equation for an edge and a polygon: the sum over the edge's faces of R - 2 (E . R)
 // / (E . N) N. E: the edge's direction, N: the normal of the intersected face, R: the direction of the curve in the
 // edge's face, away from the edge.
-V direction(const PositionsOfWorld& at, const std::array<std::uint32_t, 3>& row, const Features& features,
+template <class At>
+V direction(const At& at, const std::array<std::uint32_t, 3>& row, const Features& features,
             const FaceAdjacency& adjacency) {
   const auto& face = features.faces[row[2]];
   const V start = at[row[0]], e = unit(at[row[1]] - start), n = normal_of(at[face[0]], at[face[1]], at[face[2]]);
@@ -95,8 +96,12 @@ Intersections collect_intersections(std::vector<Worker>& workers, const Geometry
   return found;
 }
 
-void add_places(Intersections& found, const Features& features, Positions vertices, const FaceAdjacency* adjacency,
-                ThreadPool& pool) {
+namespace {
+
+// positions_of(world)[vertex]
+template <class PositionsOf>
+void add_places_by(Intersections& found, const Features& features, PositionsOf&& positions_of,
+                   const FaceAdjacency* adjacency, ThreadPool& pool) {
   const Cancellation& cancellation = pool.cancellation();
   const std::size_t n = found.ef.size();
   resize(found.points, n, cancellation), resize(found.edge_parameters, n, cancellation);
@@ -107,7 +112,7 @@ void add_places(Intersections& found, const Features& features, Positions vertic
     std::size_t world = first_row.empty() ? 0 : std::ranges::upper_bound(first_row, begin) - first_row.begin() - 1;
     for (std::size_t i = begin; i < end; ++i) {
       while (!first_row.empty() && i >= first_row[world + 1]) ++world;
-      const PositionsOfWorld at(vertices, world * features.n_vertices);
+      const auto at = positions_of(world);
       const auto& row = found.ef[i];
       const auto& face = features.faces[row[2]];
       const V q[5] = {at[row[0]], at[row[1]], at[face[0]], at[face[1]], at[face[2]]};
@@ -122,6 +127,24 @@ void add_places(Intersections& found, const Features& features, Positions vertic
       found.directions[i] = {d.x, d.y, d.z};
     }
   });
+}
+
+}  // namespace
+
+void add_places(Intersections& found, const Features& features, Positions vertices, const FaceAdjacency* adjacency,
+                ThreadPool& pool) {
+  add_places_by(
+      found, features, [&](std::size_t world) { return PositionsOfWorld(vertices, world * features.n_vertices); },
+      adjacency, pool);
+}
+
+void add_places(Intersections& found, const Features& features, const PositionOf& position_of,
+                const FaceAdjacency* adjacency, ThreadPool& pool) {
+  struct At {
+    const PositionOf& position_of;
+    V operator[](std::uint32_t vertex) const { return position_of(vertex); }
+  };
+  add_places_by(found, features, [&](std::size_t) { return At{position_of}; }, adjacency, pool);
 }
 
 }  // namespace hpccd

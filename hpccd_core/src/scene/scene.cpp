@@ -102,6 +102,22 @@ void Scene::set_thickness(std::uint32_t mesh, std::span<const double> thickness)
   meshes_[mesh].thickness.assign(thickness.begin(), thickness.end());
 }
 
+void Scene::set_shape(std::uint32_t mesh, std::span<const double> vertices) {
+  const StandardArithmetic arithmetic;
+  Mesh& m = meshes_[known(mesh, mesh).first];
+  require_no_plane(m);
+  if (vertices.size() != 3 * std::size_t{m.n_vertices})
+    throw InvalidArgument("shape: mesh '" + m.name + "' has " + std::to_string(m.n_vertices) + " vertices, but " +
+                          std::to_string(vertices.size()) +
+                          " coordinates were given; give three for each of its vertices");
+  for (std::size_t i = 0; i < vertices.size(); ++i)
+    if (!(std::fabs(vertices[i]) <= largest_in_snapshot))
+      throw InvalidArgument("shape[" + std::to_string(i / 3) +
+                            "]: has a coordinate that is not finite or beyond 1e300; give the positions of the mesh in "
+                            "its own frame");
+  m.shape.assign(vertices.begin(), vertices.end());
+}
+
 std::uint32_t Scene::add_plane(std::string name, const Plane& plane, bool is_static) {
   const StandardArithmetic arithmetic;  // otherwise a normal of denormal numbers might pass as 0
   check_plane(plane);

@@ -26,6 +26,15 @@ bool within(const double* x, const Extent& e) {
   return true;
 }
 
+std::array<double, 3> position(const MotionBounds& snapshot, const PlacedMeshes* placed, std::uint32_t vertex) {
+  if (placed) {
+    const Vec3<double> x = placed->position(vertex);
+    return {x.x, x.y, x.z};
+  }
+  const double* x = snapshot.vertices[vertex].t0;
+  return {x[0], x[1], x[2]};
+}
+
 // Following the list reads all vertices of the mesh: 1,000 of them in the time of one decision.
 bool list_would_pay(std::size_t vertices, std::size_t of_mesh) { return vertices >= 16 && 1000 * vertices >= of_mesh; }
 
@@ -66,7 +75,8 @@ Containment::Containment(const Scene& scene, const Features& features, const Mes
   }
 }
 
-std::deque<Containment::Question> Containment::questions_of(std::span<Gap> gaps, const MotionBounds& snapshot) const {
+std::deque<Containment::Question> Containment::questions_of(std::span<Gap> gaps, const MotionBounds& snapshot,
+                                                            const PlacedMeshes* placed) const {
   std::deque<Question> questions;
   for (std::size_t i = 0; i < gaps.size(); ++i) {
     Gap& gap = gaps[i];
@@ -75,10 +85,12 @@ std::deque<Containment::Question> Containment::questions_of(std::span<Gap> gaps,
       if (!closed_[outer]) return;
       const Extent &whole = snapshot.extent_of_mesh(outer), &part = snapshot.extent_of_mesh(inner);
       const std::span<const std::uint32_t> vertices = components(inner);
-      if (vertices.size() == 1 ? !(within(part.low, whole) && within(part.high, whole)) : !overlap(part, whole)) return;
+      // The extents of meshes at poses are not the least ones: then the inner one may extend beyond the outer one.
+      const bool least = vertices.size() == 1 && !placed;
+      if (least ? !(within(part.low, whole) && within(part.high, whole)) : !overlap(part, whole)) return;
       Question& q = questions.emplace_back(gap, answer, 2 * i + (answer == Inside::b), inner, outer);
       for (std::uint32_t c = 0; c < vertices.size(); ++c)
-        if (within(snapshot.vertices[vertices[c]].t0, whole)) q.candidates.push_back(c);
+        if (within(position(snapshot, placed, vertices[c]).data(), whole)) q.candidates.push_back(c);
       if (q.candidates.empty()) questions.pop_back();
     };
     ask(Inside::a, gap.mesh_a, gap.mesh_b), ask(Inside::b, gap.mesh_b, gap.mesh_a);
@@ -86,9 +98,9 @@ std::deque<Containment::Question> Containment::questions_of(std::span<Gap> gaps,
   return questions;
 }
 
-void Containment::decide(std::span<Gap> gaps, const Tree& tree, const MotionBounds& snapshot, ContainmentMemory& memory,
-                         ThreadPool& pool) const {
-  std::deque<Question> questions = questions_of(gaps, snapshot);
+void Containment::decide(std::span<Gap> gaps, const Tree& tree, const MotionBounds& snapshot,
+                         const PlacedMeshes* placed, ContainmentMemory& memory, ThreadPool& pool) const {
+  std::deque<Question> questions = questions_of(gaps, snapshot, placed);
   if (questions.empty()) return;
   // At most points_at_once components.
   const auto test = [&](Question& q, std::span<const std::uint32_t> which, OutsideList* outside) {
@@ -97,11 +109,11 @@ void Containment::decide(std::span<Gap> gaps, const Tree& tree, const MotionBoun
     std::array<Vec3<double>, points_at_once> points;
     std::array<Winding, points_at_once> windings;
     for (std::size_t i = 0; i < which.size(); ++i) {
-      const double* x = snapshot.vertices[vertices[which[i]]].t0;
+      const std::array<double, 3> x = position(snapshot, placed, vertices[which[i]]);
       points[i] = {x[0], x[1], x[2]};
     }
     winding_numbers(tree, snapshot, features_, q.outer, std::span(points).first(which.size()),
-                    std::span(windings).first(which.size()));
+                    std::span(windings).first(which.size()), placed);
     for (std::size_t i = 0; i < which.size(); ++i) {
       if (windings[i].number != 0)
         q.found.store(which[i], std::memory_order_relaxed);
@@ -128,7 +140,10 @@ void Containment::decide(std::span<Gap> gaps, const Tree& tree, const MotionBoun
       ContainmentMemory::OfPair& of_pair = memory.of_pair[q.key];
       if (q.found == none) {
         const Scene::Mesh& outer = scene_.meshes()[q.outer];
-        if (of_pair.outside) {
+        // A list follows every vertex, which meshes at poses do not compute.
+        if (placed) {
+          of_pair.outside.reset();
+        } else if (of_pair.outside) {
           of_pair.outside->follow(snapshot, pool);
         } else if (list_would_pay(q.candidates.size(), outer.n_vertices)) {
           const VertexRange range{outer.first_vertex, std::size_t{outer.first_vertex} + outer.n_vertices};

@@ -11,6 +11,7 @@
 
 #include "base/parallel.h"
 #include "bvh/motion_bounds.h"
+#include "bvh/placed_meshes.h"
 #include "bvh/tree.h"
 #include "hpccd/results.h"
 #include "solid/outside_list.h"
@@ -36,10 +37,10 @@ class Containment {
   // The arguments must outlive the object.
   Containment(const Scene& scene, const Features& features, const MeshPairs& pairs);
 
-  // Sets Gap::inside of each pair of meshes, in the order of the pairs. The tree is that of the snapshot. Throws
-  // Cancelled.
-  void decide(std::span<Gap> gaps, const Tree& tree, const MotionBounds& snapshot, ContainmentMemory& memory,
-              ThreadPool& pool) const;
+  // Sets Gap::inside of each pair of meshes, in the order of the pairs. The tree is that of the snapshot; placed: its
+  // meshes if they are at poses, otherwise null. Throws Cancelled.
+  void decide(std::span<Gap> gaps, const Tree& tree, const MotionBounds& snapshot, const PlacedMeshes* placed,
+              ContainmentMemory& memory, ThreadPool& pool) const;
 
   std::size_t bytes() const { return closed_.capacity() + 4 * (first_.capacity() + vertices_.capacity()); }
 
@@ -48,7 +49,8 @@ class Containment {
   std::span<const std::uint32_t> components(std::uint32_t mesh) const {
     return {vertices_.data() + first_[mesh], vertices_.data() + first_[mesh + 1]};
   }
-  std::deque<Question> questions_of(std::span<Gap> gaps, const MotionBounds& snapshot) const;
+  std::deque<Question> questions_of(std::span<Gap> gaps, const MotionBounds& snapshot,
+                                    const PlacedMeshes* placed) const;
 
   const Scene& scene_;
   const Features& features_;

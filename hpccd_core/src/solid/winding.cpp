@@ -70,11 +70,6 @@ bool on_triangle(const V q[4]) {
   return exact::intersect(point_and_face);
 }
 
-V position(const MotionBounds& snapshot, std::uint32_t vertex) {
-  const double* x = snapshot.vertices[vertex].t0;
-  return {x[0], x[1], x[2]};
-}
-
 double least_of(double a, double b, double c) { return std::min(std::min(a, b), c); }
 double greatest_of(double a, double b, double c) { return std::max(std::max(a, b), c); }
 
@@ -82,9 +77,9 @@ double greatest_of(double a, double b, double c) { return std::max(std::max(a, b
 // against it: there are fewer faces that way.
 class Rays {
  public:
-  Rays(const Tree& tree, const MotionBounds& snapshot, const Features& features, std::span<const V> points,
-       std::span<Winding> found)
-      : tree_(tree), snapshot_(snapshot), features_(features), points_(points), found_(found) {
+  Rays(const Tree& tree, const MotionBounds& snapshot, const PlacedMeshes* placed, const Features& features,
+       std::span<const V> points, std::span<Winding> found)
+      : tree_(tree), snapshot_(snapshot), placed_(placed), features_(features), points_(points), found_(found) {
     for (int k = 0; k < 3; ++k) {
       for (std::size_t i = 0; i < points.size(); ++i) {
         const double x = exact::coordinate(points[i], k);
@@ -93,7 +88,7 @@ class Rays {
       const auto [low, high] = std::minmax_element(at_[k], at_[k] + points.size());
       around_.low[k] = *low, around_.high[k] = *high;
     }
-    const Box& whole = tree.nodes[0].box.t0;
+    const Box whole = box_of(tree.nodes[0]);
     backwards_ = around_.low[0] + around_.high[0] < whole.low[0] + whole.high[0];
     std::ranges::fill(found, Winding{0, false});
   }
@@ -103,10 +98,12 @@ class Rays {
     while (!stack.empty()) {
       const Node& node = tree_.nodes[stack.back()];
       stack.pop_back();
-      if ((node.mesh != mixed_meshes && node.mesh != mesh) || !may_meet(node.box.t0)) continue;
+      if (node.mesh != mixed_meshes && node.mesh != mesh) continue;
+      const Box box = box_of(node);
+      if (!may_meet(box)) continue;
       if (node.children)
         stack.push_back(node.children + 1), stack.push_back(node.children);
-      else if (const unsigned which = that_may_meet(node.box.t0))
+      else if (const unsigned which = that_may_meet(box))
         test(tree_.leaves[node.leaf], which);
     }
     for (Winding& w : found_)
@@ -114,6 +111,13 @@ class Rays {
   }
 
  private:
+  Box box_of(const Node& node) const { return placed_ ? placed_->at_pose(node).box.t0 : node.box.t0; }
+  V position(std::uint32_t vertex) const {
+    if (placed_) return placed_->position(vertex);
+    const double* x = snapshot_.vertices[vertex].t0;
+    return {x[0], x[1], x[2]};
+  }
+
   bool may_meet(const Box& box) const {
     return (around_.high[1] >= box.low[1]) & (around_.low[1] <= box.high[1]) & (around_.high[2] >= box.low[2]) &
            (around_.low[2] <= box.high[2]) &
@@ -138,7 +142,7 @@ class Rays {
     V q[4];
     for (std::uint32_t slot = leaf.first_face; slot < leaf.end_face; ++slot) {
       const auto& corners = features_.faces[tree_.face_of_slot[slot]];
-      for (std::size_t i = 0; i < 3; ++i) q[1 + i] = position(snapshot_, corners[i]);
+      for (std::size_t i = 0; i < 3; ++i) q[1 + i] = position(corners[i]);
       const V low{least_of(q[1].x, q[2].x, q[3].x), least_of(q[1].y, q[2].y, q[3].y), least_of(q[1].z, q[2].z, q[3].z)};
       const V high{greatest_of(q[1].x, q[2].x, q[3].x), greatest_of(q[1].y, q[2].y, q[3].y),
                    greatest_of(q[1].z, q[2].z, q[3].z)};
@@ -160,6 +164,7 @@ class Rays {
 
   const Tree& tree_;
   const MotionBounds& snapshot_;
+  const PlacedMeshes* const placed_;
   const Features& features_;
   std::span<const V> points_;
   std::span<Winding> found_;
@@ -171,8 +176,8 @@ class Rays {
 }  // namespace
 
 void winding_numbers(const Tree& tree, const MotionBounds& snapshot, const Features& features, std::uint32_t mesh,
-                     std::span<const Vec3<double>> points, std::span<Winding> found) {
-  if (!points.empty() && !tree.nodes.empty()) return Rays(tree, snapshot, features, points, found).search(mesh);
+                     std::span<const Vec3<double>> points, std::span<Winding> found, const PlacedMeshes* placed) {
+  if (!points.empty() && !tree.nodes.empty()) return Rays(tree, snapshot, placed, features, points, found).search(mesh);
   std::ranges::fill(found, Winding{0, false});
 }
 

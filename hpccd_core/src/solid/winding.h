@@ -8,6 +8,7 @@
 
 #include "base/vec3.h"
 #include "bvh/motion_bounds.h"
+#include "bvh/placed_meshes.h"
 #include "bvh/tree.h"
 #include "scene/features.h"
 #include "solid/crossing.h"
@@ -23,10 +24,11 @@ struct Winding {
 // 100,000 triangles take a third of the time that they take one by one.
 inline constexpr std::size_t points_at_once = 16;
 
-// Of at most points_at_once points and a closed mesh in the snapshot to which the tree is fitted. Coordinates up to
-// largest_in_snapshot.
+// Of at most points_at_once points and a closed mesh in the snapshot to which the tree is fitted, or of the meshes of
+// the tree at poses, if `placed` is not null. Coordinates up to largest_in_snapshot.
 void winding_numbers(const Tree& tree, const MotionBounds& snapshot, const Features& features, std::uint32_t mesh,
-                     std::span<const Vec3<double>> points, std::span<Winding> found);
+                     std::span<const Vec3<double>> points, std::span<Winding> found,
+                     const PlacedMeshes* placed = nullptr);
 // Of a point and a closed mesh in the snapshot to which the tree is fitted. Coordinates up to largest_in_snapshot.
 Winding winding_number(const Tree& tree, const MotionBounds& snapshot, const Features& features, std::uint32_t mesh,
                        const Vec3<double>& point);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "traverse/near_corners.h"
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -28,6 +29,15 @@ NodePair near_leaves(const Tree& tree, NodePair p, SquareOfGap&& square_of_gap) 
   return p;
 }
 
+std::array<double, 3> position(const MotionBounds& snapshot, const PlacedMeshes* placed, std::uint32_t vertex) {
+  if (placed) {
+    const Vec3<double> x = placed->position(vertex);
+    return {x.x, x.y, x.z};
+  }
+  const double* x = snapshot.vertices[vertex].t0;
+  return {x[0], x[1], x[2]};
+}
+
 // The corners of a leaf, in coordinates of the boxes.
 template <class Real>
 struct LeafCorners {
@@ -36,13 +46,15 @@ struct LeafCorners {
   const CornersOf& features;
   Real at[CornersOf::most_corners][3];
 
-  LeafCorners(const Tree& tree, const MotionBounds& snapshot, std::uint32_t number)
+  LeafCorners(const Tree& tree, const MotionBounds& snapshot, const PlacedMeshes* placed, std::uint32_t number)
       : leaf(tree.leaves[number]),
         vertices(tree.corners.data() + leaf.first_corner),
         features(tree.corners_of[number]) {
-    for (std::uint32_t i = 0; i < leaf.n_corners(); ++i)
-      for (int k = 0; k < 3; ++k)
-        at[i][k] = static_cast<Real>(snapshot.map.precise(snapshot.vertices[vertices[i]].t0[k], k));
+    for (std::uint32_t i = 0; i < leaf.n_corners(); ++i) {
+      const std::array<double, 3> x = position(snapshot, placed, vertices[i]);
+      for (std::size_t k = 0; k < 3; ++k)
+        at[i][k] = static_cast<Real>(snapshot.map.precise(x[k], static_cast<int>(k)));
+    }
   }
 };
 
@@ -74,9 +86,10 @@ bool are_tested(const Tree& tree, const FilterView* filter, const LeafCorners<Re
 }
 
 template <class Real>
-double distance_of_corners(const Tree& tree, const MotionBounds& snapshot, const FilterView* filter, NodePair leaves) {
-  const LeafCorners<Real> of_a(tree, snapshot, tree.nodes[leaves.a].leaf),
-      of_b(tree, snapshot, tree.nodes[leaves.b].leaf);
+double distance_of_corners(const Tree& tree, const MotionBounds& snapshot, const PlacedMeshes* placed,
+                           const FilterView* filter, NodePair leaves) {
+  const LeafCorners<Real> of_a(tree, snapshot, placed, tree.nodes[leaves.a].leaf),
+      of_b(tree, snapshot, placed, tree.nodes[leaves.b].leaf);
   constexpr Real infinity = std::numeric_limits<Real>::infinity();
   Real least = infinity;
   std::uint32_t nearest[2] = {};
@@ -90,19 +103,24 @@ double distance_of_corners(const Tree& tree, const MotionBounds& snapshot, const
       if (square < least && are_tested(tree, filter, of_a, i, of_b, j)) least = square, nearest[0] = i, nearest[1] = j;
     }
   if (least == infinity) return std::numeric_limits<double>::infinity();
-  const auto &x = snapshot.vertices[of_a.vertices[nearest[0]]].t0, &y = snapshot.vertices[of_b.vertices[nearest[1]]].t0;
+  const std::array<double, 3> x = position(snapshot, placed, of_a.vertices[nearest[0]]),
+                              y = position(snapshot, placed, of_b.vertices[nearest[1]]);
   return std::hypot(x[0] - y[0], x[1] - y[1], x[2] - y[2]);
 }
 
 }  // namespace
 
 double distance_of_near_corners(const Tree& tree, const MotionBounds& snapshot, const FineBoxes* fine,
-                                const FilterView* filter, std::uint32_t a, std::uint32_t b) {
+                                const PlacedMeshes* placed, const FilterView* filter, std::uint32_t a,
+                                std::uint32_t b) {
   if (fine)
     return distance_of_corners<double>(
-        tree, snapshot, filter, near_leaves(tree, {a, b}, [&](NodePair p) { return fine->square_of_gap(p.a, p.b); }));
-  return distance_of_corners<float>(tree, snapshot, filter, near_leaves(tree, {a, b}, [&](NodePair p) {
-                                      return tree.nodes[p.a].square_of_gap(tree.nodes[p.b]);
+        tree, snapshot, placed, filter,
+        near_leaves(tree, {a, b}, [&](NodePair p) { return fine->square_of_gap(p.a, p.b); }));
+  return distance_of_corners<float>(tree, snapshot, placed, filter, near_leaves(tree, {a, b}, [&](NodePair p) {
+                                      const Node &node_a = tree.nodes[p.a], &node_b = tree.nodes[p.b];
+                                      return placed ? placed->at_pose(node_a).square_of_gap(placed->at_pose(node_b))
+                                                    : node_a.square_of_gap(node_b);
                                     }));
 }
 

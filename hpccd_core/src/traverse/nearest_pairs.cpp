@@ -27,7 +27,7 @@ bool NearestPair::before(const NearestPair& other) const {
 
 NearestPairs::NearestPairs(const MeshPairs& pairs, const PairRules& rules, const FilterView* filter,
                            const Features& features, const MotionBounds& motion, const Tree& tree,
-                           const ThicknessTable& thickness)
+                           const ThicknessTable& thickness, PlacedMeshes* placed)
     : pairs_(pairs),
       rules_(rules),
       filter_(filter),
@@ -36,24 +36,13 @@ NearestPairs::NearestPairs(const MeshPairs& pairs, const PairRules& rules, const
       tree_(tree),
       thickness_(thickness),
       entries_(std::make_unique<Entry[]>(pairs.size())),
-      least_edge_(tree.nodes.size(), Tree::none),
+      placed_(placed),
       fine_(motion.spread ? std::make_unique<FineBoxes>(tree, motion) : nullptr),
       scale_(motion.box_scale),
       sums_(motion.box_rounding),
       // For a pair as large as the scene: mapped coordinates are within 2.25 of zero, so the sum of p, a and b is below
       // 14.
-      rounding_(14 * test_rounding / motion.map.scale) {
-  for (std::size_t i = tree.nodes.size(); i-- > 0;) {  // children come after their parents
-    const Node& node = tree.nodes[i];
-    if (node.children) {
-      least_edge_[i] = least_edge(node.children, node.children + 1);
-      continue;
-    }
-    const LeafRange& leaf = tree.leaves[node.leaf];
-    for (std::uint32_t slot = leaf.first_edge; slot < leaf.end_edge; ++slot)
-      least_edge_[i] = std::min(least_edge_[i], tree.edge_of_slot[slot]);
-  }
-}
+      rounding_(14 * test_rounding / motion.map.scale) {}
 
 bool NearestPairs::offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair) {
   Entry& entry = at(mesh_a, mesh_b);
@@ -77,7 +66,7 @@ void NearestPairs::begin(std::uint32_t a, std::uint32_t b) {
   if (entry.begun.exchange(true, std::memory_order_relaxed)) return;
   const FilterView* filter = rules_.rule(mesh_a, mesh_b).filtered ? filter_ : nullptr;
   const double most_lack = thickness_.even(mesh_a) && thickness_.even(mesh_b) ? 0 : lack(mesh_a, mesh_b, 0);
-  const double distance = distance_of_near_corners(tree_, motion_, fine_.get(), filter, a, b) + most_lack;
+  const double distance = distance_of_near_corners(tree_, motion_, fine_.get(), placed_, filter, a, b) + most_lack;
   if (!(distance < std::numeric_limits<double>::infinity())) return;
   const std::lock_guard lock(entry.lock);
   // The computed distance of the nearest pair may exceed the limit by the rounding of the test; the pair must be found

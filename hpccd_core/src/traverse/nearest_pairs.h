@@ -10,6 +10,7 @@
 
 #include "base/spin_lock.h"
 #include "bvh/motion_bounds.h"
+#include "bvh/placed_meshes.h"
 #include "bvh/tree.h"
 #include "elementary/pair.h"
 #include "scene/feature_filter.h"
@@ -33,9 +34,11 @@ struct NearestPair {
 
 class NearestPairs {
  public:
-  // The arguments must outlive the object.
+  // The arguments must outlive the object. The tree has its least edges. placed: null, or the meshes of the tree if they
+  // are at poses.
   NearestPairs(const MeshPairs& pairs, const PairRules& rules, const FilterView* filter, const Features& features,
-               const MotionBounds& motion, const Tree& tree, const ThicknessTable& thickness);
+               const MotionBounds& motion, const Tree& tree, const ThicknessTable& thickness,
+               PlacedMeshes* placed = nullptr);
 
   // Features farther apart than this along an axis, in coordinates of the boxes, cannot improve the result.
   float reach(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
@@ -61,7 +64,9 @@ class NearestPairs {
   // Boxes in double precision, if floats hardly distinguish features; otherwise null.
   const FineBoxes* fine() const { return fine_.get(); }
   // The lowest edge number in either node.
-  std::uint32_t least_edge(std::uint32_t a, std::uint32_t b) const { return std::min(least_edge_[a], least_edge_[b]); }
+  std::uint32_t least_edge(std::uint32_t a, std::uint32_t b) const {
+    return std::min(tree_.least_edge[a], tree_.least_edge[b]);
+  }
   std::uint32_t mesh_of(std::uint32_t vertex) const { return features_.mesh_of_vertex[vertex]; }
   // Offers a pair; returns whether it improves the result.
   bool offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair);
@@ -92,8 +97,8 @@ class NearestPairs {
   const MotionBounds& motion_;
   const Tree& tree_;
   const ThicknessTable& thickness_;
-  std::unique_ptr<Entry[]> entries_;       // by number of the pair
-  std::vector<std::uint32_t> least_edge_;  // by node
+  PlacedMeshes* const placed_;
+  std::unique_ptr<Entry[]> entries_;  // by number of the pair
   std::unique_ptr<FineBoxes> fine_;
   double scale_, sums_, rounding_;
 };

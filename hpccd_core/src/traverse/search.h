@@ -135,6 +135,10 @@ struct ContactSearch final : Search {
 struct SnapshotSearch : Search {
   SnapshotSearch(const Tree& tree, const PairRules& rules, Simd simd);
   float reach = 0;
+  PlacedMeshes* placed = nullptr;  // the meshes of the tree if they are at poses: leaves are fitted where they are tested
+  void fit(LeafPair pair) const {
+    if (placed) placed->fit(pair.first), placed->fit(pair.second);
+  }
   void traverse(ThreadPool& pool, std::vector<Worker>& workers) override;
 };
 

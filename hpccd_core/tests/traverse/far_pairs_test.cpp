@@ -147,7 +147,7 @@ TEST(FarPairs, NearCornersAreNoNearerThanTheMeshes) {
       m.each([&](const LeafRange& a, const LeafRange& b, const Node&, const Node&) {
         for (const Measured& p : m.measured(a, b)) least = std::min(least, p.distance);
       });
-      const double found = distance_of_near_corners(m.tree, m.motion, nullptr, nullptr, m.top(0), m.top(1));
+      const double found = distance_of_near_corners(m.tree, m.motion, nullptr, nullptr, nullptr, m.top(0), m.top(1));
       EXPECT_GE(found, least * (1 - 1e-15));
       EXPECT_LE(found, least + 7 * scale);
     }
@@ -163,7 +163,7 @@ TEST(FarPairs, CornersWithoutFeaturesThatAreTestedTellNothing) {
     if (rope) edges = {0, 1, 1, 2};
     scene->add_mesh("other", faces, 3, {}, edges);
     const TwoMeshes m(scene, {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0}, {0, 0, 2}, 1);
-    return distance_of_near_corners(m.tree, m.motion, nullptr, nullptr, m.top(0), m.top(1));
+    return distance_of_near_corners(m.tree, m.motion, nullptr, nullptr, nullptr, m.top(0), m.top(1));
   };
   EXPECT_EQ(corners_of(false, true), 2);
   EXPECT_EQ(corners_of(true, false), INFINITY);

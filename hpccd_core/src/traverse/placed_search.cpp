@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "traverse/pair_pool.h"
+#include "traverse/snapshot_boxes.h"
+#include "traverse/worker.h"
+
+namespace hpccd {
+namespace {
+
+#include "traverse/walk.inl"
+
+}  // namespace
+
+void traverse_placed(SnapshotSearch& search, ThreadPool& pool, std::vector<Worker>& workers) {
+  traverse_all(SnapshotBoxes<AtPoses>{search.reach, {*search.placed}}, search, pool, workers);
+}
+
+void traverse_placed(DistanceSearch& search, ThreadPool& pool, std::vector<Worker>& workers) {
+  traverse_all(NearerBoxes<AtPoses>(search.tree, search.nearest, {*search.placed}), search, pool, workers);
+}
+
+}  // namespace hpccd
