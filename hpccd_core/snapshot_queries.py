@@ -134,8 +134,8 @@ class SnapshotQueries(SnapshotCalls, Generic[ProximityResult, IntersectionsResul
         of two pairs at the same exact distance is rounded to the smaller double is unspecified, but the same on every
         machine.
 
-        Results by poses are bit-identical to those of the positions that :meth:`positions_at` returns. If every mesh has
-        a shape, such a call computes only the positions that its search needs, on the CPU.
+        Results by poses are bit-identical to those of the positions that :meth:`positions_at` returns. If every mesh
+        has a shape, such a call computes only the positions that its search needs, on the CPU.
 
         Examples
         --------
@@ -161,9 +161,7 @@ class SnapshotQueries(SnapshotCalls, Generic[ProximityResult, IntersectionsResul
         n = len(gaps) // self.worlds
         return cast(DistancesResult, [gaps[k * n : (k + 1) * n] for k in range(self.worlds)])
 
-    def positions_at(
-        self, poses: ArrayLike | None = None, *, vertices: Positions | None = None
-    ) -> NDArray[np.float64]:
+    def positions_at(self, poses: ArrayLike | None = None, *, vertices: Positions | None = None) -> NDArray[np.float64]:
         """The positions of all vertices at poses, as queries by poses use them.
 
         Parameters

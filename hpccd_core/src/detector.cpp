@@ -333,15 +333,17 @@ struct Detector::Impl {
     for (const Scene::Mesh& mesh : common.scene->meshes())
       if (!mesh.has_shape()) n += mesh.n_vertices;
     if (others.n != n * options().worlds)
-      throw InvalidArgument("vertices: the meshes without a shape have " + std::to_string(n) + " vertices" +
-                            (options().worlds > 1 ? " in each of " + std::to_string(options().worlds) + " worlds" : "") +
-                            ", but " + std::to_string(others.n) +
-                            " were given; with poses, give those of the meshes without a shape only, in the order "
-                            "added");
+      throw InvalidArgument(
+          "vertices: the meshes without a shape have " + std::to_string(n) + " vertices" +
+          (options().worlds > 1 ? " in each of " + std::to_string(options().worlds) + " worlds" : "") + ", but " +
+          std::to_string(others.n) +
+          " were given; with poses, give those of the meshes without a shape only, in the order "
+          "added");
     check_memory("vertices", others);
     if (others.on_device)
-      throw InvalidArgument("vertices: are in a GPU's memory; copy them to the host, or give the positions of all "
-                            "meshes without poses");
+      throw InvalidArgument(
+          "vertices: are in a GPU's memory; copy them to the host, or give the positions of all "
+          "meshes without poses");
     return poses_of_meshes(*common.scene, poses, options().worlds);
   }
 

@@ -87,8 +87,8 @@ class HPCCD_API Detector {
   Proximity proximity_at(std::span<const Pose> poses, double distance, Positions others = {});
   Intersections intersections_at(std::span<const Pose> poses, Positions others = {});
   std::vector<Gap> distances_at(std::span<const Pose> poses, Positions others = {});
-  /// The positions of all vertices at these poses, x y z, for all other queries: those of a shape in double precision, by
-  /// the matrix of the quaternion. An identity returns the shape itself.
+  /// The positions of all vertices at these poses, x y z, for all other queries: those of a shape in double precision,
+  /// by the matrix of the quaternion. An identity returns the shape itself.
   std::vector<double> positions_at(std::span<const Pose> poses, Positions others = {});
 
   /// Winding numbers of points with respect to a mesh, exact at every accuracy. `points`: the same number for each

@@ -51,8 +51,8 @@ struct Plane {
 
 /// Where a mesh with a shape is: a rotation of its shape, then a translation.
 struct Pose {
-  std::array<double, 3> position{0, 0, 0};         ///< translation, in units of the coordinates
-  std::array<double, 4> quaternion{0, 0, 0, 1};    ///< rotation, x y z w; of length 1 within 1e-3, then normalised
+  std::array<double, 3> position{0, 0, 0};       ///< translation, in units of the coordinates
+  std::array<double, 4> quaternion{0, 0, 0, 1};  ///< rotation, x y z w; of length 1 within 1e-3, then normalised
 };
 
 /// Pairs of features of one mesh that are ignored because they were near each other at rest.

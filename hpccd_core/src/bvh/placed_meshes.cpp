@@ -17,8 +17,8 @@ namespace {
 
 // Rounding errors of bounds at a pose, in coordinates of the boxes. Centres and half extents are within 3.9 of zero (a
 // mesh is at most the root of three times as long in its own frame as along the axes), and so are their sums over three
-// axes. Rounding numbers to floats, products and sums of both: at most 4.9e-6. Along a slanted direction all are twice as
-// large.
+// axes. Rounding numbers to floats, products and sums of both: at most 4.9e-6. Along a slanted direction all are twice
+// as large.
 constexpr float axis_margin = 8e-6f, slanted_margin = 2e-5f;
 
 // Calls f once of all threads, unless the state is `fitted` already; returns when it is.
@@ -92,8 +92,8 @@ void PlacedMeshes::measure() {
   if (edge > 0) finest_ = std::min(finest_, edge);
 }
 
-// With each mesh turned as in its own frame, where its boxes will be, but at its place in the scene: so that meshes that
-// are near each other are so in the tree.
+// With each mesh turned as in its own frame, where its boxes will be, but at its place in the scene: so that meshes
+// that are near each other are so in the tree.
 void PlacedMeshes::build_tree() {
   const std::size_t n = features_.n_vertices;
   {
@@ -132,7 +132,8 @@ void PlacedMeshes::fit_local_boxes() {
       Box& box = local_[node];
       for (std::uint32_t c = tree_.leaves[i].first_corner; c < tree_.leaves[i].end_corner; ++c)
         for (int k = 0; k < 3; ++k) {
-          const double x = mesh.shape[3 * std::size_t{tree_.corners[c] - mesh.first_vertex} + static_cast<std::size_t>(k)];
+          const double x =
+              mesh.shape[3 * std::size_t{tree_.corners[c] - mesh.first_vertex} + static_cast<std::size_t>(k)];
           const auto at = static_cast<float>((x - mesh.center[k]) * mesh.scale);
           box.low[k] = std::min(box.low[k], at), box.high[k] = std::max(box.high[k], at);
         }
@@ -197,8 +198,7 @@ Extent PlacedMeshes::extent_of(const Placed& mesh) const {
   for (int i = 0; i < 3; ++i) {
     double at = shift[i], half = margin;
     for (int j = 0; j < 3; ++j)
-      at += r[i][j] * mesh.center[j],
-          half += std::fabs(r[i][j]) * (0.5 * mesh.local.high[j] - 0.5 * mesh.local.low[j]);
+      at += r[i][j] * mesh.center[j], half += std::fabs(r[i][j]) * (0.5 * mesh.local.high[j] - 0.5 * mesh.local.low[j]);
     e.low[i] = at - half, e.high[i] = at + half;
   }
   return e;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Meshes that keep their shape, at poses. Their tree is built once; a new pose costs nothing per vertex. Each node has a
-// box in the frame of its mesh; its bounds in the scene are computed where the search visits it. The positions of a
+// Meshes that keep their shape, at poses. Their tree is built once; a new pose costs nothing per vertex. Each node has
+// a box in the frame of its mesh; its bounds in the scene are computed where the search visits it. The positions of a
 // leaf's corners are computed, and its rows filled, where the search reaches the leaf: then everything that tests
 // features works as if the tree had been fitted to the positions.
 #pragma once
@@ -52,10 +52,10 @@ class PlacedMeshes {
     rigid::Placing placing{pose};
     const double* shape = nullptr;
     std::uint32_t first_vertex = 0;
-    Extent local;            // in its own frame
-    double center[3] = {};   // of that extent
-    double scale = 1;        // of its boxes
-    double largest = 0;      // coordinate, in its own frame
+    Extent local;              // in its own frame
+    double center[3] = {};     // of that extent
+    double scale = 1;          // of its boxes
+    double largest = 0;        // coordinate, in its own frame
     std::uint32_t fitted = 0;  // the state of its vertices and leaves that are fitted to this pose
     Floats4 axes[3], extents[3], slanted_axes[3], slanted_extents[3];
     Floats4 shift, slanted_shift, margin, slanted_margin;

@@ -121,7 +121,8 @@ void join_kdops(Tree& tree, const LeafRange& leaf, const std::vector<VertexKdop>
 void fit_leaf(Tree& tree, std::uint32_t number, const MotionBounds& motion) {
   const LeafRange& leaf = tree.leaves[number];
   Node& node = tree.nodes[tree.leaf_nodes[number]];
-  node.box = leaf_bounds(tree, leaf, [&](std::uint32_t c) -> const MotionBox& { return motion.boxes[tree.corners[c]]; });
+  node.box =
+      leaf_bounds(tree, leaf, [&](std::uint32_t c) -> const MotionBox& { return motion.boxes[tree.corners[c]]; });
   if (tree.by_kdops) join_kdops(tree, leaf, motion.kdops);
   if (tree.by_kdops && motion.of_any_part) contain_start(tree.kdops[number]);
   if (tree.by_kdops && motion.grown)
@@ -208,8 +209,8 @@ void refit(Tree& tree, const MotionBounds& motion, const std::vector<char>& rest
 
 void fit_leaf(Tree& tree, std::uint32_t number, const MotionBox* corner_boxes) {
   const LeafRange& leaf = tree.leaves[number];
-  tree.nodes[tree.leaf_nodes[number]].box = leaf_bounds(
-      tree, leaf, [&](std::uint32_t c) -> const MotionBox& { return corner_boxes[c - leaf.first_corner]; });
+  tree.nodes[tree.leaf_nodes[number]].box =
+      leaf_bounds(tree, leaf, [&](std::uint32_t c) -> const MotionBox& { return corner_boxes[c - leaf.first_corner]; });
 }
 
 void find_least_edges(Tree& tree) {

@@ -52,8 +52,7 @@ struct LeafCorners {
         features(tree.corners_of[number]) {
     for (std::uint32_t i = 0; i < leaf.n_corners(); ++i) {
       const std::array<double, 3> x = position(snapshot, placed, vertices[i]);
-      for (std::size_t k = 0; k < 3; ++k)
-        at[i][k] = static_cast<Real>(snapshot.map.precise(x[k], static_cast<int>(k)));
+      for (std::size_t k = 0; k < 3; ++k) at[i][k] = static_cast<Real>(snapshot.map.precise(x[k], static_cast<int>(k)));
     }
   }
 };
@@ -114,9 +113,9 @@ double distance_of_near_corners(const Tree& tree, const MotionBounds& snapshot, 
                                 const PlacedMeshes* placed, const FilterView* filter, std::uint32_t a,
                                 std::uint32_t b) {
   if (fine)
-    return distance_of_corners<double>(
-        tree, snapshot, placed, filter,
-        near_leaves(tree, {a, b}, [&](NodePair p) { return fine->square_of_gap(p.a, p.b); }));
+    return distance_of_corners<double>(tree, snapshot, placed, filter, near_leaves(tree, {a, b}, [&](NodePair p) {
+                                         return fine->square_of_gap(p.a, p.b);
+                                       }));
   return distance_of_corners<float>(tree, snapshot, placed, filter, near_leaves(tree, {a, b}, [&](NodePair p) {
                                       const Node &node_a = tree.nodes[p.a], &node_b = tree.nodes[p.b];
                                       return placed ? placed->at_pose(node_a).square_of_gap(placed->at_pose(node_b))

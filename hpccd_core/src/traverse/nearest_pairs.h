@@ -34,8 +34,8 @@ struct NearestPair {
 
 class NearestPairs {
  public:
-  // The arguments must outlive the object. The tree has its least edges. placed: null, or the meshes of the tree if they
-  // are at poses.
+  // The arguments must outlive the object. The tree has its least edges. placed: null, or the meshes of the tree if
+  // they are at poses.
   NearestPairs(const MeshPairs& pairs, const PairRules& rules, const FilterView* filter, const Features& features,
                const MotionBounds& motion, const Tree& tree, const ThicknessTable& thickness,
                PlacedMeshes* placed = nullptr);

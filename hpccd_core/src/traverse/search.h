@@ -135,7 +135,8 @@ struct ContactSearch final : Search {
 struct SnapshotSearch : Search {
   SnapshotSearch(const Tree& tree, const PairRules& rules, Simd simd);
   float reach = 0;
-  PlacedMeshes* placed = nullptr;  // the meshes of the tree if they are at poses: leaves are fitted where they are tested
+  PlacedMeshes* placed =
+      nullptr;  // the meshes of the tree if they are at poses: leaves are fitted where they are tested
   void fit(LeafPair pair) const {
     if (placed) placed->fit(pair.first), placed->fit(pair.second);
   }

@@ -32,8 +32,8 @@ struct PlacedMeshesTest : testing::TestWithParam<double> {
       double length = 0;
       for (double& x : pose.quaternion) x = number(random), length += x * x;
       for (double& x : pose.quaternion) x /= std::sqrt(length);
-      const rigid::Placing turn(rigid::Pose{{pose.quaternion[0], pose.quaternion[1], pose.quaternion[2],
-                                             pose.quaternion[3]}, {0, 0, 0}});
+      const rigid::Placing turn(
+          rigid::Pose{{pose.quaternion[0], pose.quaternion[1], pose.quaternion[2], pose.quaternion[3]}, {0, 0, 0}});
       const rigid::Vector far = turn({GetParam(), GetParam(), GetParam()});
       pose.position = {number(random) - far.x, number(random) - far.y, number(random) - far.z};
     }
