@@ -40,7 +40,7 @@ class SnapshotCalls:
     def _ask_at(self, query: str, vertices: object, poses: object, *more: object) -> Any:
         """A query of meshes at poses. vertices: of the meshes without a shape."""
         if vertices is None and poses is None and not self._posed and not self._has_static_shapes:
-            raise TypeError(f"{query}: takes vertices or, for meshes that were added with a shape, poses; got neither")
+            raise TypeError("vertices: give positions or, for meshes that were added with a shape, poses; got neither")
         if self._detailed is not None:
             raise ValueError("poses: not offered with detail; give the positions, or make a detector without detail")
         rows = arguments.poses(poses, self._posed, self.worlds)
@@ -57,5 +57,4 @@ class SnapshotCalls:
             return np.empty(shape)
         if isinstance(vertices, Mapping) or device_arrays.is_on_device(vertices):
             raise TypeError("vertices: with poses, give one array in host memory, of the meshes that have no shape")
-        array = arguments.positions_of_others(vertices, shape)
-        return array
+        return arguments.positions_of_others(vertices, shape)

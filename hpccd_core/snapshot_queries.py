@@ -134,8 +134,8 @@ class SnapshotQueries(SnapshotCalls, Generic[ProximityResult, IntersectionsResul
         of two pairs at the same exact distance is rounded to the smaller double is unspecified, but the same on every
         machine.
 
-        Results by poses are bit-identical to those of the positions that :meth:`positions_at` returns. If every mesh
-        has a shape, such a call computes only the positions that its search needs, on the CPU.
+        Results by poses are bit-identical to those of the positions that :meth:`positions_at` returns, and much faster
+        if every mesh has a shape: only what the search needs is computed, on the CPU.
 
         Examples
         --------
@@ -166,9 +166,8 @@ class SnapshotQueries(SnapshotCalls, Generic[ProximityResult, IntersectionsResul
 
         Parameters
         ----------
-        poses : ArrayLike, shape (K, 7), optional
-        vertices : ArrayLike, shape (U, 3), optional
-            Both as in :meth:`distances`.
+        poses, vertices : ArrayLike, optional
+            As in :meth:`distances`.
 
         Returns
         -------
