@@ -5,7 +5,7 @@
   python -m bench inside --parts curves --peers trueform
   python -m bench inside --parts containment
   python -m bench inside --parts penetration
-  python -m bench inside --parts rigid --peers trueform
+  python -m bench inside --parts poses --peers trueform
 
 points: near the surface (1e-6 to 1e-2 of the size), in the box of the mesh, far (2 to 10 sizes), or hard: copies of
 single coordinates of vertices, and points that are a few roundings of single precision away from vertices, edges and
@@ -17,7 +17,7 @@ of the mesh.
 penetration: one mesh beside itself. first: without a start. warm: a moved by a thousandth of its size each time, with
 the translation before as the start. A translation is free if intersections and distances of the moved meshes say so.
 
-rigid: two spheres that keep their shape, of a million triangles each. still: the poses of the call before. moving: one
+poses: two spheres that keep their shape, of a million triangles each. still: the poses of the call before. moving: one
 sphere turns and moves by a hundredth of its size in each call. positions: of both, computed before the call. trueform:
 neighbor_search, and intersection_curves; its tree is made before, and a pose is the transformation of its mesh.
 """
@@ -38,7 +38,7 @@ from hpccd_core.rigid.transform import Rigid
 from hpccd_ros.bench.sources import of_scene
 from hpccd_ros.scenes.shapes import torus
 
-PARTS = ("points", "curves", "containment", "penetration", "rigid")
+PARTS = ("points", "curves", "containment", "penetration", "poses")
 PEERS = ("trueform", "open3d", "libigl")
 KINDS = ("near", "box", "far", "hard")
 FRAMES = 4  # of a deforming mesh
@@ -81,7 +81,7 @@ COLUMNS = {
         "first, ms": "first_ms",
         "warm, ms": "warm_ms",
     },
-    "rigid": {
+    "poses": {
         "spheres": "place",
         "query": "query",
         "state": "state",
@@ -121,7 +121,9 @@ def run(args) -> lab.Report:
             "curves": lambda: of_curves(result, args, threads, [peer for peer in peers if hasattr(peer, "curves")]),
             "containment": lambda: of_containment(result, args, threads),
             "penetration": lambda: of_penetration(result, args, threads),
-            "rigid": lambda: of_rigid(result, args, threads, [p for p in peers if hasattr(p, "nearest")]),
+            "poses": lambda: of_poses(
+                result, args, threads, [p for p in peers if hasattr(p, "nearest") and p.dtype == np.float64]
+            ),
         }
         for part in parts:
             ask[part]()
@@ -160,7 +162,8 @@ class TrueForm:
         return mesh
 
     def nearest(self, meshes):
-        return float(self._kit.neighbor_search(*meshes)[1][0]) ** 0.5
+        found = self._kit.neighbor_search(*meshes)
+        return None if found is None else float(found[1][0]) ** 0.5
 
     def curves(self, meshes):
         kit = self._kit
@@ -531,24 +534,28 @@ def penetrating(size: float):
 # Rigid bodies
 
 
-def of_rigid(result, args, threads, peers):
+def of_poses(result, args, threads, peers):
     """Smallest distance and intersections of two spheres, by poses and by positions."""
     vertices, faces = hc.shapes.icosphere(max(2, round((args.size * 1_000_000 / 20) ** 0.5)))
     scene = hc.Scene()
     scene.add_mesh("still", faces, shape=vertices, static=True, self_collision=False)
     scene.add_mesh("moved", faces, shape=vertices, self_collision=False)
-    for place, at in (("apart", (3.0, 0.1, 0.2)), ("intersecting", (0.9, 0.1, 0.2))):
+    for place, at in (
+        ("apart", (3.0, 0.1, 0.2)),
+        ("apart, along an axis", (3.0, 0, 0)),
+        ("intersecting", (0.9, 0.1, 0.2)),
+    ):
         for state in ("still", "moving"):
             poses = [pose_number(at, k) for k in range(FRAMES if state == "moving" else 1)]
             for query in ("distances", "intersections"):
-                ways = ways_of_rigid(scene, vertices, faces, poses, query, threads, peers)
+                ways = ways_of_poses(scene, vertices, faces, poses, query, threads, peers)
                 ms, found = lab.in_turn(f"{place}, {query}, {state}", ways, args.repeat, clock_of(threads))
                 for way, times in ms.items():
                     median = float(np.median(times))
                     of = {"place": place, "query": query, "state": state, "triangles": 2 * len(faces)}
                     of |= {"threads": threads, "way": way, "median_ms": median, "least_ms": min(times)}
                     ratio = median / float(np.median(ms["hpccd"]))
-                    result.add(part="rigid", **of, over_hpccd=ratio, found=found[way])
+                    result.add(part="poses", **of, over_hpccd=ratio, found=found[way])
 
 
 def pose_number(at, k: int) -> np.ndarray:
@@ -557,7 +564,7 @@ def pose_number(at, k: int) -> np.ndarray:
     return np.array([*(np.array(at) + 0.01 * k), *(turn / np.linalg.norm(turn))])
 
 
-def ways_of_rigid(scene, vertices, faces, poses, query, threads, peers) -> dict:
+def ways_of_poses(scene, vertices, faces, poses, query, threads, peers) -> dict:
     found_of = {"distances": lambda gaps: gaps[0].distance, "intersections": lambda hits: len(hits.ef)}[query]
     ways = {}
     by_poses, by_positions = (getattr(hc.Detector(scene, threads=threads), query) for _ in range(2))

@@ -111,8 +111,12 @@ void traverse_all(const Boxes& boxes, Query& search, ThreadPool& pool, std::vect
   constexpr std::size_t enough = 64;
   std::vector<NodePair> tasks = traversal_tasks(search.tree, search.rules, boxes, enough);
   if constexpr (Boxes::shrink) boxes.sort(tasks, 0);  // the last pair is processed first
-  PairPool pairs(search.tree, tasks, pool.size());
-  pool.share([&](int thread) {
+  // A few pairs of leaves take less time than to wake a thread.
+  constexpr typename Boxes::Ends ends;
+  const bool few = std::is_same_v<typename Boxes::Ends, AtLeaves> && tasks.size() <= enough &&
+                   std::ranges::all_of(tasks, [&](NodePair p) { return is_end(search.tree.nodes, p, ends); });
+  PairPool pairs(search.tree, tasks, few ? 1 : pool.size());
+  const auto job = [&](int thread) {
     Worker& worker = workers[thread];
     BusyThread busy(pairs, thread);
     std::vector<NodePair> stack;
@@ -126,5 +130,6 @@ void traverse_all(const Boxes& boxes, Query& search, ThreadPool& pool, std::vect
         return true;
       });
     worker.flush();
-  });
+  };
+  few ? job(0) : pool.share(job);
 }
