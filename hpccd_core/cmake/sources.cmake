@@ -32,7 +32,7 @@ set(hpccd_sources
   src/paper/published.cpp src/paper/refit.cpp src/paper/scheduling.cpp src/paper/shared_pairs.cpp
   src/paper/task_units.cpp src/paper/upkeep.cpp
   src/hybrid/communication.cpp src/hybrid/engine.cpp src/hybrid/segments.cpp src/hybrid/sink.cpp
-  src/backends/available.cpp src/backends/cpu_backend.cpp src/backends/gpu_backend.cpp
+  src/backends/available.cpp src/backends/cpu_backend.cpp src/backends/gpu_backend.cpp src/backends/gpu_distances.cpp
   src/backends/gpu_contacts.cpp src/backends/hybrid_backend.cpp src/backends/moving_tree.cpp src/backends/near_list.cpp
   src/backends/changed_pairs.cpp src/backends/one_by_one.cpp src/backends/planes.cpp src/backends/resources.cpp src/backends/rest_pairs.cpp src/backends/shortening.cpp src/backends/tuner.cpp
   src/backends/work_counts.cpp src/backends/world_by_world.cpp src/backends/worlds_on_cpus.cpp

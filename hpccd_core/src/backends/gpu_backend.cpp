@@ -75,6 +75,13 @@ std::optional<Intersections> GpuBackend::intersections(Positions vertices) {
   return attempt([&] { return pierced_faces(vertices); });
 }
 
+std::optional<std::vector<Gap>> GpuBackend::distances(Positions vertices) {
+  std::vector<Gap> gaps;
+  const std::optional<bool> complete = attempt([&] { return find_gaps(vertices, gaps); });
+  if (!complete.value_or(false)) return std::nullopt;
+  return gaps;
+}
+
 std::optional<Detected> GpuBackend::detect_in_place(Positions t0, Positions t1) {
   require_rest(t0, t1);
   return attempt([&] {

@@ -15,6 +15,9 @@
 #include "backends/world_positions.h"
 #include "gpu/device.h"
 #include "gpu/pipeline.h"
+#include "solid/containment.h"
+#include "traverse/mesh_pairs.h"
+#include "traverse/nearest_pairs.h"
 
 namespace hpccd {
 
@@ -29,6 +32,7 @@ class GpuBackend final : public DetectionBackend {
   std::optional<Intersections> intersections(Positions vertices) override;
   // For one world.
   std::optional<WindingNumbers> winding_numbers(Positions vertices, Positions points, std::uint32_t mesh) override;
+  std::optional<std::vector<Gap>> distances(Positions vertices) override;
   std::optional<SignedDistances> signed_distances(Positions vertices, Positions points, std::uint32_t mesh) override;
   // As detect, for one world, without points and normals: rows in the memory that the device has written. If there are
   // none after all, they are in `contacts`. Nothing if the device failed.
@@ -123,6 +127,18 @@ class GpuBackend final : public DetectionBackend {
   NearRadius near_;                  // of the pipeline's near list; its edge length when the tree was built
   std::uint64_t places_on_cpu_ = 0;  // rows with points or normals computed by the CPU, for results on the device
   std::vector<unsigned char> downloaded_[2];
+
+  // For distances; created by the first query.
+  void prepare_distances();
+  // False if the search is left to the CPU: there is nothing to search, or too much.
+  bool find_gaps(Positions vertices, std::vector<Gap>& gaps);
+  NearestPair decide_nearest(const gpu::UndecidedNearest& pair, double limit) const;
+  void decide_containment(std::vector<Gap>& gaps, const std::vector<gpu::NearestOfMeshes>& nearest, Positions vertices);
+  std::optional<MeshPairs> mesh_pairs_;
+  std::optional<Containment> containment_;
+  std::vector<ContainmentMemory> contained_;  // by world
+  std::vector<gpu::PairToSearch> pairs_to_search_;
+  std::uint64_t version_of_pairs_ = 0;  // that of the thickness
 };
 
 }  // namespace hpccd

@@ -32,16 +32,22 @@ void name_points(Gap& gap) {
   for (double& x : gap.normal) x = -x;
 }
 
-Gap gap_of(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& found, const Geometry& g) {
-  Gap gap{mesh_a, mesh_b};
+void positions_of(const Geometry& g, const NearestPair& pair, V at[5]) {
+  if (pair.kind == Kind::edge_face) return edge_face_positions(g, pair.first, pair.second, at);
+  V other_end[4];
+  pair_positions(g, pair.kind, pair.first, pair.second, at, other_end);
+}
+
+}  // namespace
+
+Gap gap_of(std::array<std::uint32_t, 2> meshes, const NearestPair& found, const Vec3<double> at[5], const Geometry& g) {
+  Gap gap{meshes[0], meshes[1]};
   if (!(found.distance < INFINITY)) return gap;
   gap.distance = found.without_thickness;
   if (found.kind == Kind::edge_face) {
     gap.kind = GapKind::edge_face;
     gap.features = {g.edges[found.first][0], g.edges[found.first][1], found.second};
-    V q[5];
-    edge_face_positions(g, found.first, found.second, q);
-    const std::array<double, 3> point = point_of(point_on_edge(q, intersection_place(q)));
+    const std::array<double, 3> point = point_of(point_on_edge(at, intersection_place(at)));
     gap.points = {point, point};
     return gap;
   }
@@ -54,7 +60,9 @@ Gap gap_of(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& found,
     gap.features = {a[0], a[1], b[0], b[1]};
   }
   constexpr Outputs wanted{false, true, true, true, AtTime::start};
-  const PairPlaces places = pair_places(undecided_pair(g, {found.first, found.second, found.kind}), 0, wanted);
+  UndecidedPair pair{found.kind, {}, {}, g.separations.thickness_of(found.kind, found.first, found.second)};
+  std::copy_n(at, 4, pair.t0), std::copy_n(at, 4, pair.t1);
+  const PairPlaces places = pair_places(pair, 0, wanted);
   gap.points = {point_of(places.closest[0]), point_of(places.closest[1])};
   pair_vertices(g, found.kind, found.first, found.second, gap.vertices.data());
   std::ranges::copy(places.weights, gap.weights.begin());
@@ -63,15 +71,16 @@ Gap gap_of(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& found,
   return gap;
 }
 
-}  // namespace
-
 std::vector<Gap> collect_gaps(const NearestPairs& nearest, const Geometry& geometry, const Cancellation& cancellation) {
   const MeshPairs& pairs = nearest.pairs();
   std::vector<Gap> gaps;
   gaps.reserve(pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     cancellation.heed();
-    gaps.push_back(gap_of(pairs[i][0], pairs[i][1], nearest.found(i), geometry));
+    const NearestPair& found = nearest.found(i);
+    V at[5];
+    if (found.distance < INFINITY) positions_of(geometry, found, at);
+    gaps.push_back(gap_of(pairs[i], found, at, geometry));
   }
   return gaps;
 }

@@ -102,9 +102,13 @@ class DeviceScene {
     fill_thickness(params);
   }
   // As at the last update_separations().
+  Thicknesses thickness() const {
+    return thick_ ? Thicknesses{vertex_thickness_.data(), edge_thickness_.data(), face_thickness_.data()}
+                  : Thicknesses{};
+  }
   template <class T>
   void fill_thickness(LaunchParams<T>& params) const {
-    if (thick_) params.thickness = {vertex_thickness_.data(), edge_thickness_.data(), face_thickness_.data()};
+    params.thickness = thickness();
   }
   // Changes with every value that fill_separations writes.
   u64 separations_version() const { return separations_.version() + thickness_.version(); }

@@ -6,6 +6,7 @@
 #include "gpu/device_contacts.cuh"
 #include "gpu/device_motion.cuh"
 #include "gpu/device_near_list.cuh"
+#include "gpu/device_nearest.cuh"
 #include "gpu/device_places.cuh"
 #include "gpu/device_points.cuh"
 #include "gpu/device_positions.cuh"
@@ -37,6 +38,7 @@ class DevicePipeline : public Pipeline {
         features_(features),
         scene_(scene, features, options.accuracy, options.features, separations, thickness, filter, options.worlds),
         tree_(options.worlds),
+        nearest_(options.worlds),
         positions_(device),
         lists_(16 * typical_size(), 4 * typical_size(), typical_size() / 2),
         contacts_(scene_.keys().bits(), options.worlds * (std::size_t{features.n_vertices} + features.edges.size()),
@@ -61,6 +63,7 @@ class DevicePipeline : public Pipeline {
     check(cudaSetDevice(device_), "cudaSetDevice");
     check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
     tree_.set(features_, tree);
+    nearest_.set(tree);
   }
 
   bool run(Positions t0, Positions t1, Best best, ThreadPool& pool) override {
@@ -81,6 +84,14 @@ class DevicePipeline : public Pipeline {
     const PointsTask task = points_.bring(points, mesh, with_distances, pool, stream_);
     return vertices.is_double ? locate_points<double>(vertices, task, pool)
                               : locate_points<float>(vertices, task, pool);
+  }
+  NearestPairsFound find_nearest(Positions vertices, const std::vector<PairToSearch>& pairs, std::uint64_t version,
+                                 ThreadPool& pool) override {
+    begin();
+    scene_.update_separations();
+    goal_ = Goal::nearest, query_ = Query::nearest;
+    return vertices.is_double ? find_nearest<double>(vertices, pairs, version, pool)
+                              : find_nearest<float>(vertices, pairs, version, pool);
   }
   bool run_for_earliest(Positions t0, Positions t1, Pairs pairs, Best best, ThreadPool& pool) override {
     begin();
@@ -138,6 +149,9 @@ class DevicePipeline : public Pipeline {
   template <class T>
   std::optional<std::vector<PointOnFace>> locate_points(Positions vertices, const PointsTask& task, ThreadPool& pool);
   template <class T>
+  NearestPairsFound find_nearest(Positions vertices, const std::vector<PairToSearch>& pairs, std::uint64_t version,
+                                 ThreadPool& pool);
+  template <class T>
   LaunchParams<T> frame_params(double distance, const T* given_t0, const T* given_t1);
   template <class T>
   void launch(LaunchParams<T>& params);
@@ -178,6 +192,7 @@ class DevicePipeline : public Pipeline {
 
   DeviceScene scene_;
   DeviceTree tree_;
+  DeviceNearest nearest_;
   DevicePositions positions_;
   DeviceMotion motion_;
   DeviceBuffer<uint2> leaf_pairs_;
@@ -190,7 +205,7 @@ class DevicePipeline : public Pipeline {
   Counters last_counters_{};  // of the last frame that was not only for near lists: reported by stats()
 
   // The purpose of a frame: contacts for the caller, or less.
-  enum class Goal : unsigned char { results, earliest, earliest_of_near, near_list, points };
+  enum class Goal : unsigned char { results, earliest, earliest_of_near, near_list, points, nearest };
   bool for_earliest() const { return goal_ == Goal::earliest || goal_ == Goal::earliest_of_near; }
 
   Hints hints_;
@@ -279,6 +294,40 @@ std::optional<std::vector<PointOnFace>> DevicePipeline::locate_points(Positions 
   std::vector<PointOnFace> found = points_.results(task, stream_);
   if (host_counters_.data()->bad) return std::nullopt;
   return found;
+}
+
+template <class T>
+NearestPairsFound DevicePipeline::find_nearest(Positions vertices, const std::vector<PairToSearch>& pairs,
+                                               std::uint64_t version, ThreadPool& pool) {
+  undecided_.clear(), passes_ = 0;
+  timer_.begin(stream_);
+  const T* given[2];
+  positions_.bring(vertices, vertices, given, pool, stream_);
+  given_doubles_ = vertices.is_double;
+  LaunchParams<T> params = frame_params(0, given[0], given[1]);
+  timer_.mark("upload", stream_);
+  motion_.begin(params, multiprocessors_, stream_);
+  motion_.launch(query_, params, stream_);
+  timer_.mark("bounds", stream_);
+  launch_refit(params);
+  timer_.mark("refit", stream_);
+  launch_area(params);
+  for (;;) {
+    ++passes_;
+    NearestTask task = nearest_.task(pairs, version, params);
+    task.thickness = scene_.thickness();
+    launch_nearest(params, task, nearest_.levels(), nearest_.within_meshes(), on_stream());
+    nearest_.copy_results(task, stream_);
+    copy_counters();
+    check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
+    NearestPairsFound r;
+    r.good = host_counters_.data()->bad == 0;
+    if (!r.good) return r;
+    const DeviceNearest::Room room = nearest_.grow();
+    r.gave_up = room == DeviceNearest::Room::too_little;
+    if (r.gave_up) return r;
+    if (room == DeviceNearest::Room::enough) return nearest_.found(task, stream_);
+  }
 }
 
 template <class T>
@@ -600,10 +649,11 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
   s["leaf_pairs"] = c.leaf_pairs;
   s["gpu_passes"] = passes_;
   s["gpu_segments"] = lists_.n_segments();
-  s["gpu_bytes"] = scene_.bytes() + tree_.bytes() + positions_.bytes() + motion_.bytes() + leaf_pairs_.bytes() +
+  s["gpu_bytes"] = scene_.bytes() + tree_.bytes() + nearest_.bytes() + positions_.bytes() + motion_.bytes() + leaf_pairs_.bytes() +
                    lists_.bytes() + contacts_.bytes() + places_.bytes() + near_.bytes() + hints_.bytes() +
                    points_.bytes();
   if (for_earliest() || goal_ == Goal::near_list) s["near_pairs"] = near_.size();
+  if (goal_ == Goal::nearest) s["leaf_pairs"] = nearest_.counters().leaves, s["candidates"] = nearest_.counters().tests;
   return s;
 }
 

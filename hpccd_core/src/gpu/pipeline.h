@@ -16,6 +16,7 @@
 #include "bvh/tree.h"
 #include "contacts/outputs.h"
 #include "elementary/pair.h"
+#include "gpu/nearest.h"
 #include "gpu/places.h"
 #include "gpu/query.h"
 #include "hpccd/hpccd.h"
@@ -88,6 +89,9 @@ class Pipeline {
   virtual std::optional<std::vector<PointOnFace>> locate_points(Positions vertices, Positions points,
                                                                 std::uint32_t mesh, bool with_distances,
                                                                 ThreadPool& pool) = 0;
+  // The nearest features of each of these pairs of meshes, in each world. `version` changes with the pairs.
+  virtual NearestPairsFound find_nearest(Positions vertices, const std::vector<PairToSearch>& pairs,
+                                         std::uint64_t version, ThreadPool& pool) = 0;
   // After run(): the pairs left to the exact fallback on the CPU, the first feature of each numbered through all
   // worlds.
   virtual const std::vector<Candidate>& undecided() const = 0;

@@ -9,9 +9,12 @@ enum class Query : unsigned char {
   separations,    // contacts, and pairs within a separation above 0 that some meshes have
   proximity,      // of one snapshot: pairs within a distance
   intersections,  // of one snapshot: edges that intersect or touch faces
+  nearest,        // of one snapshot: the nearest features of each pair of meshes
 };
 
-constexpr bool of_snapshot(Query q) { return q == Query::proximity || q == Query::intersections; }
+constexpr bool of_snapshot(Query q) {
+  return q == Query::proximity || q == Query::intersections || q == Query::nearest;
+}
 // Whether boxes grow, so that boxes of features within a distance overlap.
 constexpr bool grows_boxes(Query q) { return q == Query::separations || q == Query::proximity; }
 

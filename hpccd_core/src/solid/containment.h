@@ -42,6 +42,11 @@ class Containment {
   void decide(std::span<Gap> gaps, const Tree& tree, const MotionBounds& snapshot, const PlacedMeshes* placed,
               ContainmentMemory& memory, ThreadPool& pool) const;
 
+  // Whether one mesh may lie inside another, as far as their boxes tell.
+  bool possible(std::uint32_t inner, std::uint32_t outer, bool boxes_meet, bool within_box) const {
+    return closed_[outer] && (components(inner).size() == 1 ? within_box : boxes_meet);
+  }
+
   std::size_t bytes() const { return closed_.capacity() + 4 * (first_.capacity() + vertices_.capacity()); }
 
  private:

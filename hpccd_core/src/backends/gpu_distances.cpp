@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+// Distances by the device: it finds the nearest features of all pairs of meshes in one search. The CPU decides the
+// pairs that only integers can decide, and which meshes lie inside others.
+#include <algorithm>
+
+#include "backends/gpu_backend.h"
+#include "backends/world_positions.h"
+#include "contacts/gaps.h"
+#include "elementary/exact/intersection.h"
+
+namespace hpccd {
+namespace {
+
+constexpr std::size_t most_searched_pairs = std::size_t{1} << 22;  // a result on the device takes 170 bytes
+
+}  // namespace
+
+void GpuBackend::prepare_distances() {
+  const ThicknessTable& thickness = shared_.common.thickness;
+  if (mesh_pairs_ && version_of_pairs_ == thickness.version()) return;
+  if (!mesh_pairs_) {
+    mesh_pairs_.emplace(shared_.rules, shared_.scene->meshes().size());
+    containment_.emplace(*shared_.scene, shared_.features, *mesh_pairs_);
+    contained_.resize(n_worlds());
+  }
+  version_of_pairs_ = thickness.version();
+  const std::vector<double>& largest = thickness.largest_of_meshes();
+  pairs_to_search_.clear();
+  for (std::size_t i = 0; i < mesh_pairs_->size(); ++i) {
+    const auto [a, b] = (*mesh_pairs_)[i];
+    const double thickest = largest.empty() ? 0 : largest[a] + largest[b];
+    const bool even = thickness.even(a) && thickness.even(b);
+    pairs_to_search_.push_back({a, b, shared_.rules.rule(a, b).filtered, thickest, even ? 0 : thickest});
+  }
+}
+
+bool GpuBackend::find_gaps(Positions vertices, std::vector<Gap>& gaps) {
+  prepare_distances();
+  const std::size_t n_all = pairs_to_search_.size() * n_worlds();
+  if (shared_.features.n_primitives() == 0 || n_all == 0 || n_all > most_searched_pairs) return false;
+  prepare_snapshot(gpu::Query::nearest, vertices, 0);
+  const gpu::NearestPairsFound found =
+      pipeline_->find_nearest(vertices, pairs_to_search_, version_of_pairs_, shared_.pool);
+  if (!found.good) throw_bad_snapshot(vertices);
+  shared_.profiler.mark("gpu");
+  if (found.gave_up) return false;
+  const std::size_t n_pairs = mesh_pairs_->size();
+  std::vector<NearestPair> nearest(found.of_meshes.size());
+  std::vector<const gpu::PairOfFeatures*> features(nearest.size());
+  for (std::size_t i = 0; i < nearest.size(); ++i) {
+    const gpu::NearestOfMeshes& n = found.of_meshes[i];
+    features[i] = &n.pair;
+    if (n.found) nearest[i] = {n.distance, n.pair.kind, n.pair.first, n.pair.second, n.without_thickness};
+  }
+  std::vector<NearestPair> decided(found.undecided.size());
+  constexpr std::size_t pairs_a_piece = 8;  // about 10 us, the time to wake a thread
+  parallel_for(shared_.pool, decided.size(), pairs_a_piece, [&](std::size_t begin, std::size_t end, int) {
+    for (std::size_t i = begin; i < end; ++i)
+      decided[i] = decide_nearest(found.undecided[i], found.of_meshes[found.undecided[i].of].limit);
+  });
+  for (std::size_t i = 0; i < decided.size(); ++i)
+    if (const std::size_t of = found.undecided[i].of; decided[i].before(nearest[of]))
+      nearest[of] = decided[i], features[of] = &found.undecided[i].pair;
+  shared_.profiler.mark("exact");
+
+  Geometry geometry{};
+  geometry.edges = shared_.features.edges.data(), geometry.faces = shared_.features.faces.data();
+  geometry.separations.thickness = shared_.common.thickness.view();
+  gaps.resize(nearest.size());
+  for (std::size_t i = 0; i < gaps.size(); ++i) {
+    shared_.cancellation.heed();
+    gaps[i] = gap_of((*mesh_pairs_)[i % n_pairs], nearest[i], features[i]->at, geometry);
+  }
+  shared_.profiler.mark("contacts");
+  decide_containment(gaps, found.of_meshes, vertices);
+  for (std::size_t i = 0; i < gaps.size(); ++i)
+    if (const NearestPair& pair = nearest[i]; gaps[i].kind != GapKind::none)
+      gaps[i].distance -= geometry.separations.thickness_of(pair.kind, pair.first, pair.second);
+  shared_.profiler.mark("containment");
+  return true;
+}
+
+// As Worker::resolve and DistanceSearch::take.
+NearestPair GpuBackend::decide_nearest(const gpu::UndecidedNearest& u, double limit) const {
+  const auto& [first, second, kind, at] = u.pair;
+  if (kind == Kind::edge_face) return exact::intersect(at) ? NearestPair{0, kind, first, second, 0} : NearestPair{};
+  Separations separations;
+  separations.thickness = shared_.common.thickness.view();
+  const double thickness = separations.thickness_of(kind, first, second);
+  const double lack = pairs_to_search_[u.of % pairs_to_search_.size()].thickest - thickness;
+  UndecidedPair pair{kind, {}, {}, limit - lack};
+  if (pair.separation < 0) return {};
+  std::copy_n(at, 4, pair.t0), std::copy_n(at, 4, pair.t1);
+  FallbackCounts counts;
+  const std::optional<double> distance = decide_proximity(Accuracy::exact, pair, counts);
+  return distance ? NearestPair{*distance + lack, kind, first, second, *distance} : NearestPair{};
+}
+
+// Only for worlds in which boxes of meshes allow it: the CPU's hierarchy must be refitted.
+void GpuBackend::decide_containment(std::vector<Gap>& gaps, const std::vector<gpu::NearestOfMeshes>& nearest,
+                                    Positions vertices) {
+  const std::size_t n_pairs = mesh_pairs_->size();
+  for (std::size_t k = 0; k < n_worlds(); ++k) {
+    const std::span of_world_k = std::span(gaps).subspan(k * n_pairs, n_pairs);
+    const bool possible = std::ranges::any_of(of_world_k, [&](const Gap& gap) {
+      const gpu::NearestOfMeshes& n = nearest[static_cast<std::size_t>(&gap - gaps.data())];
+      return gap.mesh_a != gap.mesh_b && gap.distance > 0 &&
+             (containment_->possible(gap.mesh_a, gap.mesh_b, n.boxes_meet, n.a_within_b) ||
+              containment_->possible(gap.mesh_b, gap.mesh_a, n.boxes_meet, n.b_within_a));
+    });
+    if (!possible) continue;
+    shared_.tree.bound(on_host(of_world(vertices, k), 0));
+    shared_.tree.fit(shared_.profiler);
+    containment_->decide(of_world_k, shared_.tree.tree(), shared_.tree.motion(), contained_[k], shared_.pool);
+  }
+}
+
+}  // namespace hpccd

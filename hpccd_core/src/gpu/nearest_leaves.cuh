@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pairs of leaves in the search for the nearest features: one warp each. Candidates wait in shared memory until a warp
+// is full of them, and are tested at once, so that each result shortens the remaining search.
+#pragma once
+
+#include "gpu/near_candidates.cuh"
+#include "gpu/nearest_nodes.cuh"
+
+namespace hpccd::gpu {
+
+inline constexpr u32 nearest_warps = 4;
+
+// Candidates of one kind that wait for the test.
+struct WaitingPairs {
+  static constexpr u32 room = 64;
+  uint2 pairs[room];
+  u32 of[room];
+};
+
+struct NearestSpace {
+  StagedFeatures side[2];  // the features of each leaf that are near the other leaf
+  StagedCorners corners;
+  WaitingPairs waiting[3];  // by kind
+};
+
+__device__ inline bool within_reach(const SnapshotBox& a, const SnapshotBox& b, float reach) {
+  const float slanted = slanted_reach(reach);
+  bool apart = false;
+  float square = 0;
+  for (int k = 0; k < 6; ++k) {
+    const float gap = fmaxf(b.low[k] - a.high[k], a.low[k] - b.high[k]);
+    apart |= gap > (k < 3 ? reach : slanted);
+    if (k < 3) square += gap > 0 ? gap * gap : 0;
+  }
+  return !apart && !(square > reach * reach);
+}
+
+// One leaf of a pair: its features, and the lane's corner.
+struct SearchedLeaf {
+  DeviceLeaf leaf;
+  u32 corner;
+  Bound axes, slanted;
+
+  template <class T>
+  __device__ SearchedLeaf(const LaunchParams<T>& params, u32 number, u32 world) : leaf(params.leaves[number]) {
+    corner = lane_corner(params, leaf, world);
+    const float4* at = reinterpret_cast<const float4*>(params.points + corner);
+    axes = bound_of(__ldg(at)), slanted = bound_of(__ldg(at + 1));
+    axes.tag = corner;
+  }
+  __device__ bool has_corner() const { return lane_number() < leaf.n_corners(); }
+};
+
+// Farther apart along the direction between the centres of their boxes: boxes of slanted leaves are larger than the
+// leaves by nearly their own size. Coordinates are within 2.25, a dot product has a rounding error of at most 1.5e-6.
+__device__ inline bool farther_apart(const SearchedLeaf& a, const SearchedLeaf& b, const DeviceBox& box_a,
+                                     const DeviceBox& box_b, float reach) {
+  float u[3], square = 0;
+  for (int k = 0; k < 3; ++k) {
+    u[k] = (box_b.low[0].x[k] - box_a.low[0].x[k]) + (box_b.high[0].x[k] - box_a.high[0].x[k]);
+    square += u[k] * u[k];
+  }
+  if (!(square > 1e-20f)) return false;
+  const float to_unit = rsqrtf(square);
+  float most = -INFINITY, least = INFINITY;
+  for (int k = 0; k < 3; ++k) u[k] *= to_unit;
+  if (a.has_corner()) most = u[0] * a.axes.x[0] + u[1] * a.axes.x[1] + u[2] * a.axes.x[2];
+  if (b.has_corner()) least = u[0] * b.axes.x[0] + u[1] * b.axes.x[1] + u[2] * b.axes.x[2];
+  for (int d = 16; d > 0; d /= 2) {
+    most = fmaxf(most, __shfl_xor_sync(all_lanes, most, d));
+    least = fminf(least, __shfl_xor_sync(all_lanes, least, d));
+  }
+  return least - most > reach * (1 + 1e-5f) + 4e-6f;
+}
+
+// The square of the smallest distance of two corners.
+__device__ inline float square_of_corners(const SearchedLeaf& a, const SearchedLeaf& b) {
+  float least = INFINITY;
+#pragma unroll 1
+  for (u32 i = 0; i < b.leaf.n_corners(); ++i) {
+    float square = 0;
+    for (int k = 0; k < 3; ++k) {
+      const float d = a.axes.x[k] - __shfl_sync(all_lanes, b.axes.x[k], i);
+      square += d * d;
+    }
+    if (a.has_corner()) least = fminf(least, square);
+  }
+  for (int d = 16; d > 0; d /= 2) least = fminf(least, __shfl_xor_sync(all_lanes, least, d));
+  return least;
+}
+
+// The features of a leaf within reach of a box, in the order of leaves.
+template <class T>
+__device__ __forceinline__ NearCounts stage_near(const LaunchParams<T>& params, NearestSpace& s, u32 side,
+                                                 const SearchedLeaf& l, const SnapshotBox& other, bool all,
+                                                 float reach) {
+  __syncwarp();
+  if (l.has_corner()) store(&s.corners.axes[lane_number()], l.axes), store(&s.corners.slanted[lane_number()], l.slanted);
+  __syncwarp();
+  const LeafOrder order(l.leaf);
+  NearCounts n;
+#pragma unroll 1
+  for (u32 base = 0; base < order.n; base += 32) {
+    const u32 i = base + lane_number();
+    SnapshotBox box;
+    FeatureNumbers numbers;
+    bool near = i < order.n;
+    if (near) {
+      s.corners.bounds_of(feature_at(params, l.leaf, i), order.is_vertex(i), {0, 0}, box, numbers);
+      near = all || within_reach(box, other, reach);
+    }
+    const u32 at = n.add(order, i, near);
+    if (near) s.side[side].put(at, box, numbers);
+  }
+  return n;
+}
+
+// Edge and face of different leaves, or of one, by their vertices: for an edge the third repeats the second.
+__device__ inline bool share_a_vertex(const FeatureNumbers& a, const FeatureNumbers& b) {
+  bool shared = false;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) shared |= a.vertex[i] == b.vertex[j];
+  return shared;
+}
+
+template <class T>
+struct NearestOfLeaves {
+  const LaunchParams<T>& params;
+  const NearestTask& task;
+  NearestSpace& s;
+  u32 n[3] = {0, 0, 0};
+  u64 tests = 0;
+
+  // All candidates that wait beyond `keep` of each kind, up to a warp of them.
+  __device__ __forceinline__ void test(u32 keep) {
+    __syncwarp();
+#pragma unroll
+    for (u32 k = 0; k < 3; ++k) {
+      if (n[k] <= keep) continue;
+      const u32 now = min(n[k], 32u);
+      n[k] -= now, tests += now;
+      const bool valid = lane_number() < now;
+      const uint2 pair = valid ? s.waiting[k].pairs[n[k] + lane_number()] : uint2{0, 0};
+      const u32 of = valid ? s.waiting[k].of[n[k] + lane_number()] : 0;
+      if (k == static_cast<u32>(Kind::edge_face)) test_crossing(params, task, valid, pair, of);
+      if (k == static_cast<u32>(Kind::edge_edge)) test_nearest<Kind::edge_edge>(params, task, valid, pair, of);
+      if (k == static_cast<u32>(Kind::vertex_face)) test_nearest<Kind::vertex_face>(params, task, valid, pair, of);
+      __syncwarp();
+    }
+  }
+
+  // The lane's candidate: in side x the i-th staged feature, in side y the j-th.
+  __device__ __forceinline__ bool candidate(Kind kind, u32 x, u32 i, u32 y, u32 j, float reach, u32 world,
+                                            uint2& pair) const {
+    const FeatureNumbers a = s.side[x].numbers_of(i), b = s.side[y].numbers_of(j);
+    if (share_a_vertex(a, b) || !within_reach(s.side[x].box(i), s.side[y].box(j), reach)) return false;
+    pair = {a.number, b.number};
+    if (kind == Kind::vertex_face) pair.x -= world * params.n_vertices;  // the number of a vertex is that of all worlds
+    if (kind == Kind::edge_edge && pair.y < pair.x) pair = {pair.y, pair.x};
+    if (params.edge_kinds) {
+      if (kind == Kind::edge_face && params.edge_kinds[pair.x] == EdgeKind::point) return false;
+      if (kind == Kind::edge_edge && never_paired(params.edge_kinds[pair.x], params.edge_kinds[pair.y])) return false;
+    }
+    return true;
+  }
+
+  __device__ bool ignored(Kind kind, uint2 pair) const {
+    return kind == Kind::edge_face   ? params.filter.edge_face(pair.x, pair.y)
+           : kind == Kind::edge_edge ? params.filter.edge_edge(pair.x, pair.y)
+                                     : params.filter.vertex_face(pair.x, pair.y);
+  }
+
+  // Pairs of one kind between staged features.
+  __device__ __forceinline__ void add(Kind kind, const NearProduct& of_pairs, u32 x, u32 y, bool of_one_leaf, u32 n_one,
+                                      float reach, u32 of, u32 world, bool filtered) {
+#pragma unroll 1
+    for (u32 base = 0; base < of_pairs.n_pairs; base += 32) {
+      const u32 c = base + lane_number();
+      uint2 at = of_pairs.pair(c);
+      bool near = c < of_pairs.n_pairs;
+      if (of_one_leaf) {
+        at = two_of_one_leaf(at, of_pairs.width);
+        near = near && at.x < n_one && at.y < n_one;
+      }
+      uint2 pair{0, 0};
+      if (near) near = candidate(kind, x, of_pairs.first + at.x, y, of_pairs.second + at.y, reach, world, pair);
+      if (near && filtered) near = !ignored(kind, pair);
+      const u32 mask = __ballot_sync(all_lanes, near), k = static_cast<u32>(kind);
+      if (near) {
+        const u32 to = n[k] + __popc(mask & ((1u << lane_number()) - 1));
+        s.waiting[k].pairs[to] = pair, s.waiting[k].of[to] = of;
+      }
+      n[k] += __popc(mask);
+      if (n[k] >= 32) test(31);
+    }
+  }
+
+  __device__ __forceinline__ void search(uint4 pair) {
+    const u32 of = pair.z, world = of / task.n_pairs, node_a = params.leaf_nodes[pair.x],
+              node_b = params.leaf_nodes[pair.y];
+    NearestSoFar& so_far = task.so_far[of];
+    const SearchedMeshes& meshes = task.meshes[of - world * task.n_pairs];
+    const bool same = pair.x == pair.y;
+    const DeviceBox box_a = box_of_node(params, world, node_a), box_b = box_of_node(params, world, node_b);
+    const bool touching = same || near_in_snapshot(box_a, box_b, 0);
+    const u64 crossing = fresh(&so_far.crossing);
+    const NodeContent in_a = task.contents[node_a], in_b = task.contents[node_b];
+    if (crossing != no_pair && (!touching || min(in_a.least_edge, in_b.least_edge) > crossing >> 32)) return;
+    float reach = reach_of(so_far, limit_of(so_far));
+    if (!same && !within_reach(box_a, box_b, reach)) return;
+    const SearchedLeaf a(params, pair.x, world), b(params, pair.y, world);
+    if (!same && !touching && farther_apart(a, b, box_a, box_b, reach)) return;
+    if (meshes.bounded && !((in_a.kinds | in_b.kinds) & NodeContent::isolated_vertices)) {
+      if (lane_number() == 0 || true) {
+        const float square = square_of_corners(a, b);
+        if (lane_number() == 0) lower_limit_by_box(so_far, meshes.most_lack, square);
+        __syncwarp();
+        reach = reach_of(so_far, limit_of(so_far));
+      }
+    }
+    const SnapshotBox whole_a = load_snapshot_box(&params.leaf_boxes[world * params.n_leaves + pair.x]),
+                      whole_b = load_snapshot_box(&params.leaf_boxes[world * params.n_leaves + pair.y]);
+    const NearCounts of_a = stage_near(params, s, 0, a, whole_b, same, reach);
+    if (of_a.all() == 0) return;
+    const u32 y = same ? 0 : 1;
+    const NearCounts of_b = same ? of_a : stage_near(params, s, 1, b, whole_a, false, reach);
+    __syncwarp();
+    const bool filtered = params.filtered && are_filtered(params, a.leaf, b.leaf);
+    if (touching) {
+      add(Kind::edge_face, NearProduct::of(0, of_a.edges, of_b.edges, of_b.faces), 0, y, false, 0, 0, of, world,
+          filtered);
+      if (!same)
+        add(Kind::edge_face, NearProduct::of(0, of_b.edges, of_a.edges, of_a.faces), 1, 0, false, 0, 0, of, world,
+            filtered);
+    }
+    if (crossing != no_pair || fresh(&so_far.crossing) != no_pair) return;
+    add(Kind::vertex_face,
+        NearProduct::of(of_a.edges + of_a.faces, of_a.vertices, of_b.edges, of_b.faces), 0, y, false, 0, reach, of,
+        world, filtered);
+    if (!same)
+      add(Kind::vertex_face, NearProduct::of(of_b.edges + of_b.faces, of_b.vertices, of_a.edges, of_a.faces), 1, 0,
+          false, 0, reach, of, world, filtered);
+    add(Kind::edge_edge, same ? edges_of_one_leaf(of_a.edges) : NearProduct::of(0, of_a.edges, 0, of_b.edges), 0, y,
+        same, of_a.edges, reach, of, world, filtered);
+  }
+};
+
+template <class T>
+__global__ __launch_bounds__(32 * nearest_warps,
+                             4) void nearest_leaves_kernel(const __grid_constant__ LaunchParams<T> params,
+                                                           const __grid_constant__ NearestTask task, bool samples) {
+  __shared__ NearestSpace spaces[nearest_warps];
+  if (params.counters->bad != 0) return;
+  NearestOfLeaves<T> search{params, task, spaces[threadIdx.x / 32]};
+  const uint4* list = samples ? task.samples : task.leaves;
+  const u64 n = samples ? length(task.counters->samples, task.sample_capacity)
+                        : length(task.counters->leaves, task.leaf_capacity);
+  const u64 n_warps = static_cast<u64>(gridDim.x) * nearest_warps;
+#pragma unroll 1
+  for (u64 i = static_cast<u64>(blockIdx.x) * nearest_warps + threadIdx.x / 32; i < n; i += n_warps)
+    search.search(list[i]);
+  search.test(0);
+  if (lane_number() == 0 && search.tests) atomicAdd(&task.counters->tests, search.tests);
+}
+
+}  // namespace hpccd::gpu
