@@ -40,11 +40,13 @@ def assert_hits_same(cpu, gpu, vertices):
 
 
 def assert_gaps_same(cpu, gpu, vertices):
-    """Of these the CPU takes care, whatever the backend."""
-    for found, expected in zip(gpu.distances(vertices), cpu.distances(vertices), strict=True):
-        assert (found.distance, found.features) == (expected.distance, expected.features)
-        for name in ("points", "vertices", "weights", "normal"):
-            np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
+    all_expected = cpu.distances(vertices)
+    for _ in range(2):  # without a bound from the last frame, and with one
+        for found, expected in zip(gpu.distances(vertices), all_expected, strict=True):
+            assert (found.distance, found.kind, found.features) == (expected.distance, expected.kind, expected.features)
+            assert found.inside == expected.inside
+            for name in ("points", "vertices", "weights", "normal"):
+                np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
 
 
 @pytest.mark.parametrize("accuracy", TIERS)
@@ -57,6 +59,8 @@ def test_random_scenes(make, dtype, accuracy):
     sizes = [len(assert_near_same(cpu, gpu, vertices, distance)) for distance in (0, 1e-6, 0.1, 1.0)]
     assert sizes == sorted(sizes) and sizes[-1] > 0
     assert_hits_same(cpu, gpu, vertices)
+    assert_gaps_same(cpu, gpu, vertices)
+    assert_on_gpu(gpu)
 
 
 @pytest.mark.parametrize("make", (scenes.crumpled, scenes.lattice, scenes.soup, scenes.fringed))
@@ -188,7 +192,7 @@ def test_device_arrays(library, dtype):
 @pytest.mark.parametrize("library", ("cupy", "torch"))
 @pytest.mark.parametrize("query", ("proximity", "intersections", "distances"))
 def test_device_arrays_in_the_first_call(query, library, dtype):
-    """Distances are the CPU's: they are asked for before the detector has anything on the device."""
+    """Before the detector has anything on the device."""
     module = pytest.importorskip(library)
     scene, _, vertices = scenes.join([scenes.crumpled(np.random.default_rng(12), 12) for _ in range(2)])
     vertices = vertices.astype(dtype)
@@ -224,4 +228,6 @@ def test_bad_coordinates_are_named():
             gpu.proximity(bad, 0.1)
         with pytest.raises(ValueError, match=r"^vertices\[3, 1\] is NaN"):
             gpu.intersections(bad)
+        with pytest.raises(ValueError, match=r"^vertices\[3, 1\] is NaN"):
+            gpu.distances(bad)
         assert_near_same(cpu, gpu, vertices, 0.1)

@@ -17,4 +17,4 @@ def test_a_step_tells_where_its_contacts_and_where_its_distances_were_found():
     detector = StepDetector(SceneBuilder((MeshSettings("cloth"),)), Options(backend="gpu", distances=True))
     for _ in range(2):
         found = detector.detect(start, end)
-        assert (found.backend, found.gaps_backend) == ("gpu", "cpu")
+        assert (found.backend, found.gaps_backend) == ("gpu", "gpu")

@@ -376,7 +376,8 @@ Positions GpuBackend::on_host(Positions p, int which) {
 void GpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
   if (!pipeline_) return;
   stats.merge(pipeline_->stats());
-  stats["gpu_exact_on_cpu"] = pipeline_->undecided().size();
+  stats["gpu_exact_on_cpu"] =
+      last_boxes_.query == gpu::Query::nearest ? nearest_decided_ : pipeline_->undecided().size();
   stats["gpu_places_on_cpu"] = places_on_cpu_;
   if (last_boxes_.query == gpu::Query::intersections) stats["ef_by_integers"] = pipeline_->undecided().size();
 }

@@ -139,6 +139,7 @@ class GpuBackend final : public DetectionBackend {
   std::vector<ContainmentMemory> contained_;  // by world
   std::vector<gpu::PairToSearch> pairs_to_search_;
   std::uint64_t version_of_pairs_ = 0;  // that of the thickness
+  std::uint64_t nearest_decided_ = 0;   // pairs that the CPU decided
 };
 
 }  // namespace hpccd

@@ -12,6 +12,8 @@ namespace hpccd {
 namespace {
 
 constexpr std::size_t most_searched_pairs = std::size_t{1} << 22;  // a result on the device takes 170 bytes
+// A vertex takes a warp; more of them are those of soups, of which CPUs remember what is outside.
+constexpr std::size_t most_asked_vertices = std::size_t{1} << 16;
 
 }  // namespace
 
@@ -61,6 +63,7 @@ bool GpuBackend::find_gaps(Positions vertices, std::vector<Gap>& gaps) {
   for (std::size_t i = 0; i < decided.size(); ++i)
     if (const std::size_t of = found.undecided[i].of; decided[i].before(nearest[of]))
       nearest[of] = decided[i], features[of] = &found.undecided[i].pair;
+  nearest_decided_ = decided.size();
   shared_.profiler.mark("exact");
 
   Geometry geometry{};
@@ -96,22 +99,50 @@ NearestPair GpuBackend::decide_nearest(const gpu::UndecidedNearest& u, double li
   return distance ? NearestPair{*distance + lack, kind, first, second, *distance} : NearestPair{};
 }
 
-// Only for worlds in which boxes of meshes allow it: the CPU's hierarchy must be refitted.
+// Where boxes of meshes allow it, the device computes winding numbers. The CPU decides the worlds in which these need
+// integers, or are very many.
 void GpuBackend::decide_containment(std::vector<Gap>& gaps, const std::vector<gpu::NearestOfMeshes>& nearest,
                                     Positions vertices) {
-  const std::size_t n_pairs = mesh_pairs_->size();
+  struct Question {
+    Gap* gap;
+    Inside answer;
+    std::uint32_t world;
+    std::size_t begin, end;  // of its vertices
+  };
+  std::vector<Question> questions;
+  std::vector<gpu::VertexInMesh> asked;
+  for (std::size_t i = 0; i < gaps.size(); ++i) {
+    Gap& gap = gaps[i];
+    const gpu::NearestOfMeshes& n = nearest[i];
+    if (gap.mesh_a == gap.mesh_b || !(gap.distance > 0)) continue;
+    const auto ask = [&](Inside answer, std::uint32_t inner, std::uint32_t outer, bool within_box) {
+      if (!containment_->possible(inner, outer, n.boxes_meet, within_box)) return;
+      const auto world = static_cast<std::uint32_t>(i / mesh_pairs_->size());
+      const std::size_t begin = asked.size();
+      for (const std::uint32_t v : containment_->components(inner)) asked.push_back({world, v, outer});
+      questions.push_back({&gap, answer, world, begin, asked.size()});
+    };
+    ask(Inside::a, gap.mesh_a, gap.mesh_b, n.a_within_b), ask(Inside::b, gap.mesh_b, gap.mesh_a, n.b_within_a);
+  }
+  if (questions.empty()) return;
+  std::vector<std::int32_t> numbers(asked.size(), gpu::undecided_winding);
+  if (asked.size() <= most_asked_vertices) numbers = pipeline_->windings_of(asked);
+  std::vector<char> left_open(n_worlds(), false);
+  for (const Question& q : questions)
+    for (std::size_t i = q.begin; i < q.end; ++i)
+      if (numbers[i] == gpu::undecided_winding) left_open[q.world] = true;
+  for (const Question& q : questions) {
+    const std::span of_question = std::span(numbers).subspan(q.begin, q.end - q.begin);
+    if (left_open[q.world] || !std::ranges::any_of(of_question, [](std::int32_t number) { return number != 0; }))
+      continue;
+    q.gap->inside = q.gap->inside == Inside::none ? q.answer : Inside::both;
+  }
   for (std::size_t k = 0; k < n_worlds(); ++k) {
-    const std::span of_world_k = std::span(gaps).subspan(k * n_pairs, n_pairs);
-    const bool possible = std::ranges::any_of(of_world_k, [&](const Gap& gap) {
-      const gpu::NearestOfMeshes& n = nearest[static_cast<std::size_t>(&gap - gaps.data())];
-      return gap.mesh_a != gap.mesh_b && gap.distance > 0 &&
-             (containment_->possible(gap.mesh_a, gap.mesh_b, n.boxes_meet, n.a_within_b) ||
-              containment_->possible(gap.mesh_b, gap.mesh_a, n.boxes_meet, n.b_within_a));
-    });
-    if (!possible) continue;
+    if (!left_open[k]) continue;
     shared_.tree.bound(on_host(of_world(vertices, k), 0));
     shared_.tree.fit(shared_.profiler);
-    containment_->decide(of_world_k, shared_.tree.tree(), shared_.tree.motion(), contained_[k], shared_.pool);
+    containment_->decide(std::span(gaps).subspan(k * mesh_pairs_->size(), mesh_pairs_->size()), shared_.tree.tree(),
+                         shared_.tree.motion(), nullptr, contained_[k], shared_.pool);
   }
 }
 

@@ -18,7 +18,7 @@ class DeviceNearest {
   void set(const Tree& tree) {
     levels_ = 0, uploaded_ = false;
     const std::size_t n = tree.nodes.size();
-    std::vector<NodeContent> contents(n);
+    std::vector<NodeContent> contents(n), leaf_contents(tree.leaves.size());
     std::vector<u32> height(n, 0);
     of_meshes_.clear();
     for (std::size_t i = n; i-- > 0;) {  // children come after their parents
@@ -29,7 +29,7 @@ class DeviceNearest {
         in = {std::min(a.least_edge, b.least_edge), a.kinds | b.kinds};
         height[i] = std::max(height[node.children], height[node.children + 1]) + 1;
       } else {
-        in = of_leaf(tree, tree.leaves[node.leaf]);
+        in = leaf_contents[node.leaf] = of_leaf(tree, tree.leaves[node.leaf]);
       }
       if (node.mesh == mixed_meshes) continue;
       levels_ = std::max(levels_, height[i]);
@@ -38,7 +38,7 @@ class DeviceNearest {
       of.root = static_cast<u32>(i), of.first_leaf = node.leaf;  // that of the highest node in the end
       of.n_leaves += node.children == 0;
     }
-    upload(contents_, contents.data(), n);
+    upload(contents_, contents.data(), n), upload(leaf_contents_, leaf_contents.data(), leaf_contents.size());
   }
 
   template <class T>
@@ -58,7 +58,8 @@ class DeviceNearest {
     undecided_.reserve(1024), undecided_results_.reserve(undecided_.size());
     NearestTask t{};
     t.n_pairs = n, t.n_all = all;
-    t.meshes = meshes_.data(), t.contents = contents_.data(), t.so_far = so_far_.data();
+    t.meshes = meshes_.data(), t.contents = contents_.data(), t.leaf_contents = leaf_contents_.data(),
+    t.so_far = so_far_.data();
     for (int i = 0; i < 2; ++i) t.nodes[i] = nodes_[i].data();
     t.leaves = leaves_.data(), t.samples = samples_.data(), t.undecided = undecided_.data();
     t.node_capacity = std::min(nodes_[0].size(), nodes_[1].size()), t.leaf_capacity = leaves_.size();
@@ -101,11 +102,29 @@ class DeviceNearest {
     return r;
   }
 
+  // Vertices of the frame and the meshes around which their winding numbers are asked.
+  InsideTask ask(const std::vector<VertexInMesh>& vertices, cudaStream_t stream) {
+    const std::size_t n = std::max<std::size_t>(vertices.size(), 1);
+    asked_.reserve(n), host_asked_.reserve(n), numbers_.reserve(n);
+    for (std::size_t i = 0; i < vertices.size(); ++i)
+      host_asked_.data()[i] = {vertices[i].world, vertices[i].vertex, of_meshes_.at(vertices[i].mesh).root};
+    check(cudaMemcpyAsync(asked_.data(), host_asked_.data(), vertices.size() * sizeof(VertexAndMesh),
+                          cudaMemcpyHostToDevice, stream),
+          "cudaMemcpyAsync");
+    return {static_cast<u32>(vertices.size()), asked_.data(), numbers_.data()};
+  }
+  std::vector<std::int32_t> numbers(const InsideTask& task, cudaStream_t stream) {
+    std::vector<std::int32_t> numbers(task.n);
+    fetch(numbers.data(), task.numbers, task.n, stream);
+    check(cudaStreamSynchronize(stream), "cudaStreamSynchronize");
+    return numbers;
+  }
+
   const NearestCounters& counters() const { return *host_counters_.data(); }
   std::size_t bytes() const {
-    return contents_.bytes() + meshes_.bytes() + so_far_.bytes() + nodes_[0].bytes() + nodes_[1].bytes() +
-           leaves_.bytes() + samples_.bytes() + undecided_.bytes() + results_.bytes() + undecided_results_.bytes() +
-           counters_.bytes();
+    return contents_.bytes() + leaf_contents_.bytes() + meshes_.bytes() + so_far_.bytes() + nodes_[0].bytes() +
+           nodes_[1].bytes() + leaves_.bytes() + samples_.bytes() + undecided_.bytes() + results_.bytes() +
+           undecided_results_.bytes() + counters_.bytes() + asked_.bytes() + numbers_.bytes();
   }
 
  private:
@@ -128,7 +147,9 @@ class DeviceNearest {
   void upload_meshes(const std::vector<PairToSearch>& pairs) {
     std::vector<SearchedMeshes> meshes;
     n_within_ = 0;
-    const auto of = [&](u32 mesh) { return mesh < of_meshes_.size() ? of_meshes_[mesh] : SubtreeOfMesh{no_node, 0, 0}; };
+    const auto of = [&](u32 mesh) {
+      return mesh < of_meshes_.size() ? of_meshes_[mesh] : SubtreeOfMesh{no_node, 0, 0};
+    };
     for (const PairToSearch& p : pairs) {
       const SubtreeOfMesh a = of(p.mesh_a), b = of(p.mesh_b);
       const bool same = p.mesh_a == p.mesh_b;
@@ -148,10 +169,13 @@ class DeviceNearest {
   bool uploaded_ = false;
   u64 version_ = 0;
   std::vector<SubtreeOfMesh> of_meshes_;
-  DeviceBuffer<NodeContent> contents_;
+  DeviceBuffer<NodeContent> contents_, leaf_contents_;
   DeviceBuffer<SearchedMeshes> meshes_;
   DeviceBuffer<NearestSoFar> so_far_;
   DeviceBuffer<uint4> nodes_[2], leaves_, samples_, undecided_;
+  DeviceBuffer<VertexAndMesh> asked_;
+  PinnedBuffer<VertexAndMesh> host_asked_;
+  DeviceBuffer<std::int32_t> numbers_;
   DeviceBuffer<NearestOfMeshes> results_;
   PinnedBuffer<NearestOfMeshes> host_results_;
   DeviceBuffer<UndecidedNearest> undecided_results_;

@@ -42,9 +42,14 @@ struct UndecidedNearest {
   PairOfFeatures pair;
 };
 
+// A vertex of a world, and a closed mesh that may contain it.
+struct VertexInMesh {
+  u32 world, vertex, mesh;
+};
+
 struct NearestPairsFound {
-  bool good = true;      // all coordinates are finite and not too large
-  bool gave_up = false;  // boxes leave too many pairs of leaves
+  bool good = true;                        // all coordinates are finite and not too large
+  bool gave_up = false;                    // boxes leave too many pairs of leaves
   std::vector<NearestOfMeshes> of_meshes;  // world by world
   std::vector<UndecidedNearest> undecided;
 };

@@ -11,4 +11,8 @@ template <class T>
 void launch_nearest(const LaunchParams<T>& params, const NearestTask& task, u32 levels, bool within_meshes,
                     const Stages& stages);
 
+// Winding numbers of vertices in the same frame.
+template <class T>
+void launch_inside(const LaunchParams<T>& params, const InsideTask& task, const Stages& stages);
+
 }  // namespace hpccd::gpu

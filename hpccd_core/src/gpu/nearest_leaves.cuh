@@ -21,7 +21,17 @@ struct NearestSpace {
   StagedFeatures side[2];  // the features of each leaf that are near the other leaf
   StagedCorners corners;
   WaitingPairs waiting[3];  // by kind
+  u32 n[3];                 // of them
+  u32 tests;
 };
+
+inline constexpr u32 no_edge = 0xFFFFFFFFu;
+
+__device__ inline SnapshotBox snapshot_box(const DeviceBox& b) {
+  SnapshotBox r;
+  for (int k = 0; k < 6; ++k) r.low[k] = b.low[k / 3].x[k % 3], r.high[k] = b.high[k / 3].x[k % 3];
+  return r;
+}
 
 __device__ inline bool within_reach(const SnapshotBox& a, const SnapshotBox& b, float reach) {
   const float slanted = slanted_reach(reach);
@@ -89,13 +99,14 @@ __device__ inline float square_of_corners(const SearchedLeaf& a, const SearchedL
   return least;
 }
 
-// The features of a leaf within reach of a box, in the order of leaves.
+// The features of a leaf within reach of a box, in the order of leaves; edges up to a number only.
 template <class T>
 __device__ __forceinline__ NearCounts stage_near(const LaunchParams<T>& params, NearestSpace& s, u32 side,
-                                                 const SearchedLeaf& l, const SnapshotBox& other, bool all,
-                                                 float reach) {
+                                                 const SearchedLeaf& l, const SnapshotBox& other, bool all, float reach,
+                                                 u32 last_edge) {
   __syncwarp();
-  if (l.has_corner()) store(&s.corners.axes[lane_number()], l.axes), store(&s.corners.slanted[lane_number()], l.slanted);
+  if (l.has_corner())
+    store(&s.corners.axes[lane_number()], l.axes), store(&s.corners.slanted[lane_number()], l.slanted);
   __syncwarp();
   const LeafOrder order(l.leaf);
   NearCounts n;
@@ -107,7 +118,7 @@ __device__ __forceinline__ NearCounts stage_near(const LaunchParams<T>& params, 
     bool near = i < order.n;
     if (near) {
       s.corners.bounds_of(feature_at(params, l.leaf, i), order.is_vertex(i), {0, 0}, box, numbers);
-      near = all || within_reach(box, other, reach);
+      near = (all || within_reach(box, other, reach)) && !(order.is_edge(i) && numbers.number > last_edge);
     }
     const u32 at = n.add(order, i, near);
     if (near) s.side[side].put(at, box, numbers);
@@ -128,25 +139,20 @@ struct NearestOfLeaves {
   const LaunchParams<T>& params;
   const NearestTask& task;
   NearestSpace& s;
-  u32 n[3] = {0, 0, 0};
-  u64 tests = 0;
 
-  // All candidates that wait beyond `keep` of each kind, up to a warp of them.
-  __device__ __forceinline__ void test(u32 keep) {
+  // A warp of the candidates of one kind that wait, or all of fewer.
+  __device__ __forceinline__ void test(u32 k) {
+    const u32 now = min(s.n[k], 32u), rest = s.n[k] - now;
+    const bool valid = lane_number() < now;
+    const uint2 pair = valid ? s.waiting[k].pairs[rest + lane_number()] : uint2{0, 0};
+    const u32 of = valid ? s.waiting[k].of[rest + lane_number()] : 0;
     __syncwarp();
-#pragma unroll
-    for (u32 k = 0; k < 3; ++k) {
-      if (n[k] <= keep) continue;
-      const u32 now = min(n[k], 32u);
-      n[k] -= now, tests += now;
-      const bool valid = lane_number() < now;
-      const uint2 pair = valid ? s.waiting[k].pairs[n[k] + lane_number()] : uint2{0, 0};
-      const u32 of = valid ? s.waiting[k].of[n[k] + lane_number()] : 0;
-      if (k == static_cast<u32>(Kind::edge_face)) test_crossing(params, task, valid, pair, of);
-      if (k == static_cast<u32>(Kind::edge_edge)) test_nearest<Kind::edge_edge>(params, task, valid, pair, of);
-      if (k == static_cast<u32>(Kind::vertex_face)) test_nearest<Kind::vertex_face>(params, task, valid, pair, of);
-      __syncwarp();
-    }
+    if (lane_number() == 0) s.n[k] = rest, s.tests += now;
+    __syncwarp();
+    if (k == static_cast<u32>(Kind::edge_face)) test_crossing(params, task, valid, pair, of);
+    if (k == static_cast<u32>(Kind::edge_edge)) test_nearest<Kind::edge_edge>(params, task, valid, pair, of);
+    if (k == static_cast<u32>(Kind::vertex_face)) test_nearest<Kind::vertex_face>(params, task, valid, pair, of);
+    __syncwarp();
   }
 
   // The lane's candidate: in side x the i-th staged feature, in side y the j-th.
@@ -170,88 +176,109 @@ struct NearestOfLeaves {
                                      : params.filter.vertex_face(pair.x, pair.y);
   }
 
-  // Pairs of one kind between staged features.
-  __device__ __forceinline__ void add(Kind kind, const NearProduct& of_pairs, u32 x, u32 y, bool of_one_leaf, u32 n_one,
-                                      float reach, u32 of, u32 world, bool filtered) {
+  // Pairs of one kind between staged features: of sides x and y.
+  struct Product {
+    Kind kind;
+    u32 x, y;
+    NearProduct pairs;
+  };
+
+  // The i-th of five.
+  __device__ __forceinline__ static Product product(u32 i, const NearCounts& a, const NearCounts& b, bool same) {
+    const u32 y = same ? 0 : 1;
+    switch (i) {
+      case 0:
+        return {Kind::edge_face, 0, y, NearProduct::of(0, a.edges, b.edges, b.faces)};
+      case 1:
+        return {Kind::edge_face, y, 0, NearProduct::of(0, same ? 0 : b.edges, a.edges, a.faces)};
+      case 2:
+        return {Kind::vertex_face, 0, y, NearProduct::of(a.edges + a.faces, a.vertices, b.edges, b.faces)};
+      case 3:
+        return {Kind::vertex_face, y, 0, NearProduct::of(b.edges + b.faces, same ? 0 : b.vertices, a.edges, a.faces)};
+      default:
+        return {Kind::edge_edge, 0, y, same ? edges_of_one_leaf(a.edges) : NearProduct::of(0, a.edges, 0, b.edges)};
+    }
+  }
+
+  __device__ __forceinline__ void add(const Product& p, bool of_one_leaf, u32 n_one, float reach, u32 of, u32 world,
+                                      bool filtered) {
+    const u32 k = static_cast<u32>(p.kind);
 #pragma unroll 1
-    for (u32 base = 0; base < of_pairs.n_pairs; base += 32) {
+    for (u32 base = 0; base < p.pairs.n_pairs; base += 32) {
       const u32 c = base + lane_number();
-      uint2 at = of_pairs.pair(c);
-      bool near = c < of_pairs.n_pairs;
+      uint2 at = p.pairs.pair(c);
+      bool near = c < p.pairs.n_pairs;
       if (of_one_leaf) {
-        at = two_of_one_leaf(at, of_pairs.width);
+        at = two_of_one_leaf(at, p.pairs.width);
         near = near && at.x < n_one && at.y < n_one;
       }
       uint2 pair{0, 0};
-      if (near) near = candidate(kind, x, of_pairs.first + at.x, y, of_pairs.second + at.y, reach, world, pair);
-      if (near && filtered) near = !ignored(kind, pair);
-      const u32 mask = __ballot_sync(all_lanes, near), k = static_cast<u32>(kind);
+      if (near) near = candidate(p.kind, p.x, p.pairs.first + at.x, p.y, p.pairs.second + at.y, reach, world, pair);
+      if (near && filtered) near = !ignored(p.kind, pair);
+      const u32 mask = __ballot_sync(all_lanes, near);
       if (near) {
-        const u32 to = n[k] + __popc(mask & ((1u << lane_number()) - 1));
+        const u32 to = s.n[k] + __popc(mask & ((1u << lane_number()) - 1));
         s.waiting[k].pairs[to] = pair, s.waiting[k].of[to] = of;
       }
-      n[k] += __popc(mask);
-      if (n[k] >= 32) test(31);
+      __syncwarp();
+      if (lane_number() == 0) s.n[k] += __popc(mask);
+      __syncwarp();
+      if (s.n[k] >= 32) test(k);
     }
   }
 
   __device__ __forceinline__ void search(uint4 pair) {
-    const u32 of = pair.z, world = of / task.n_pairs, node_a = params.leaf_nodes[pair.x],
-              node_b = params.leaf_nodes[pair.y];
+    const u32 of = pair.z, world = of / task.n_pairs, first_leaf = world * params.n_leaves;
     NearestSoFar& so_far = task.so_far[of];
-    const SearchedMeshes& meshes = task.meshes[of - world * task.n_pairs];
     const bool same = pair.x == pair.y;
-    const DeviceBox box_a = box_of_node(params, world, node_a), box_b = box_of_node(params, world, node_b);
-    const bool touching = same || near_in_snapshot(box_a, box_b, 0);
-    const u64 crossing = fresh(&so_far.crossing);
-    const NodeContent in_a = task.contents[node_a], in_b = task.contents[node_b];
-    if (crossing != no_pair && (!touching || min(in_a.least_edge, in_b.least_edge) > crossing >> 32)) return;
-    float reach = reach_of(so_far, limit_of(so_far));
-    if (!same && !within_reach(box_a, box_b, reach)) return;
+    const DeviceBox box_a = load_box(&params.leaf_boxes[first_leaf + pair.x]),
+                    box_b = load_box(&params.leaf_boxes[first_leaf + pair.y]);
+    const NodeContent in_a = task.leaf_contents[pair.x], in_b = task.leaf_contents[pair.y];
     const SearchedLeaf a(params, pair.x, world), b(params, pair.y, world);
-    if (!same && !touching && farther_apart(a, b, box_a, box_b, reach)) return;
-    if (meshes.bounded && !((in_a.kinds | in_b.kinds) & NodeContent::isolated_vertices)) {
-      if (lane_number() == 0 || true) {
+    const u64 crossing = fresh(&so_far.crossing);
+    float reach = reach_of(so_far, limit_of(so_far));
+    const bool touching = same || near_in_snapshot(box_a, box_b, 0);
+    u32 last_edge = no_edge;
+    if (crossing != no_pair) {
+      last_edge = static_cast<u32>(crossing >> 32), reach = 0;
+      if (!touching || min(in_a.least_edge, in_b.least_edge) > last_edge) return;
+    } else if (!same) {
+      if (!within_reach(box_a, box_b, reach)) return;
+      if (!touching && farther_apart(a, b, box_a, box_b, reach)) return;
+      // Later pairs of features give a better bound.
+      const SearchedMeshes& meshes = task.meshes[of - world * task.n_pairs];
+      if (meshes.bounded && fresh(&so_far.key) == no_pair &&
+          !((in_a.kinds | in_b.kinds) & NodeContent::isolated_vertices)) {
         const float square = square_of_corners(a, b);
         if (lane_number() == 0) lower_limit_by_box(so_far, meshes.most_lack, square);
         __syncwarp();
         reach = reach_of(so_far, limit_of(so_far));
       }
     }
-    const SnapshotBox whole_a = load_snapshot_box(&params.leaf_boxes[world * params.n_leaves + pair.x]),
-                      whole_b = load_snapshot_box(&params.leaf_boxes[world * params.n_leaves + pair.y]);
-    const NearCounts of_a = stage_near(params, s, 0, a, whole_b, same, reach);
+    const NearCounts of_a = stage_near(params, s, 0, a, snapshot_box(box_b), same, reach, last_edge);
     if (of_a.all() == 0) return;
-    const u32 y = same ? 0 : 1;
-    const NearCounts of_b = same ? of_a : stage_near(params, s, 1, b, whole_a, false, reach);
+    const NearCounts of_b = same ? of_a : stage_near(params, s, 1, b, snapshot_box(box_a), false, reach, last_edge);
     __syncwarp();
     const bool filtered = params.filtered && are_filtered(params, a.leaf, b.leaf);
-    if (touching) {
-      add(Kind::edge_face, NearProduct::of(0, of_a.edges, of_b.edges, of_b.faces), 0, y, false, 0, 0, of, world,
-          filtered);
-      if (!same)
-        add(Kind::edge_face, NearProduct::of(0, of_b.edges, of_a.edges, of_a.faces), 1, 0, false, 0, 0, of, world,
-            filtered);
+#pragma unroll 1
+    for (u32 i = touching ? 0 : 2; i < 5; ++i) {
+      if (i == 2 && fresh(&so_far.crossing) != no_pair) return;
+      add(product(i, of_a, of_b, same), same && i == 4, of_a.edges, i < 2 ? 0 : reach, of, world, filtered);
     }
-    if (crossing != no_pair || fresh(&so_far.crossing) != no_pair) return;
-    add(Kind::vertex_face,
-        NearProduct::of(of_a.edges + of_a.faces, of_a.vertices, of_b.edges, of_b.faces), 0, y, false, 0, reach, of,
-        world, filtered);
-    if (!same)
-      add(Kind::vertex_face, NearProduct::of(of_b.edges + of_b.faces, of_b.vertices, of_a.edges, of_a.faces), 1, 0,
-          false, 0, reach, of, world, filtered);
-    add(Kind::edge_edge, same ? edges_of_one_leaf(of_a.edges) : NearProduct::of(0, of_a.edges, 0, of_b.edges), 0, y,
-        same, of_a.edges, reach, of, world, filtered);
   }
 };
 
 template <class T>
 __global__ __launch_bounds__(32 * nearest_warps,
-                             4) void nearest_leaves_kernel(const __grid_constant__ LaunchParams<T> params,
+                             5) void nearest_leaves_kernel(const __grid_constant__ LaunchParams<T> params,
                                                            const __grid_constant__ NearestTask task, bool samples) {
   __shared__ NearestSpace spaces[nearest_warps];
   if (params.counters->bad != 0) return;
-  NearestOfLeaves<T> search{params, task, spaces[threadIdx.x / 32]};
+  NearestSpace& space = spaces[threadIdx.x / 32];
+  if (lane_number() < 3) space.n[lane_number()] = 0;
+  if (lane_number() == 3) space.tests = 0;
+  __syncwarp();
+  NearestOfLeaves<T> search{params, task, space};
   const uint4* list = samples ? task.samples : task.leaves;
   const u64 n = samples ? length(task.counters->samples, task.sample_capacity)
                         : length(task.counters->leaves, task.leaf_capacity);
@@ -259,8 +286,9 @@ __global__ __launch_bounds__(32 * nearest_warps,
 #pragma unroll 1
   for (u64 i = static_cast<u64>(blockIdx.x) * nearest_warps + threadIdx.x / 32; i < n; i += n_warps)
     search.search(list[i]);
-  search.test(0);
-  if (lane_number() == 0 && search.tests) atomicAdd(&task.counters->tests, search.tests);
+  for (u32 k = 0; k < 3; ++k)
+    if (space.n[k] > 0) search.test(k);
+  if (lane_number() == 0 && space.tests) atomicAdd(&task.counters->tests, u64{space.tests});
 }
 
 }  // namespace hpccd::gpu

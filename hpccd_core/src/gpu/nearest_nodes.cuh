@@ -116,7 +116,7 @@ __global__ void begin_nearest_kernel(const __grid_constant__ LaunchParams<T> par
     const double scale = extent.map().scale;
     // For a pair as large as the scene, as in traverse/nearest_pairs.cpp.
     constexpr double test_rounding = distance_radius + 1e-14;
-    s = {bits_of(1e307), bits_of(INFINITY), no_pair,          no_pair, INFINITY, scale,
+    s = {bits_of(1e307),           bits_of(INFINITY),          no_pair, no_pair, INFINITY, scale,
          2e-15 * extent.largest(), 14 * test_rounding / scale, 0};
     if (meshes.root_a != no_node && meshes.root_b != no_node) begin_with_last(params, task, of, key, crossing);
   }
@@ -134,26 +134,26 @@ __global__ void begin_nearest_kernel(const __grid_constant__ LaunchParams<T> par
   }
 }
 
+// One lane for each pair of children: both nodes are split, and a node with itself into both children with themselves
+// and with each other.
 template <class T>
 __global__ __launch_bounds__(128) void nearest_nodes_kernel(const __grid_constant__ LaunchParams<T> params,
                                                             const __grid_constant__ NearestTask task, u32 level) {
-  const u64 n = length(task.counters->nodes[level], task.node_capacity);
+  const u64 n = 4 * length(task.counters->nodes[level], task.node_capacity);
   const u64 first = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x,
             stride = static_cast<u64>(gridDim.x) * blockDim.x;
 #pragma unroll 1
   for (u64 i = first; i - lane_number() < n; i += stride) {
-    const bool valid = i < n;
-    const uint4 pair = valid ? task.nodes[level & 1][i] : uint4{0, 0, 0, 0};
-    const u32 left_a = valid ? params.node_links[pair.x].x : 0, left_b = valid ? params.node_links[pair.y].x : 0;
-    const bool same = pair.x == pair.y;
-#pragma unroll 1
-    for (u32 k = 0; k < 4; ++k) {
-      // Both nodes are split. Of a node with itself: both children with themselves, and with each other.
-      const u32 of_a = k & 1, of_b = k >> 1;
-      const bool exists = valid && (left_a || of_a == 0) && (left_b || of_b == 0) && !(same && k == 1);
-      const u32 a = left_a ? left_a + of_a : pair.x, b = left_b ? left_b + of_b : pair.y;
-      keep_nodes(params, task, exists && may_improve(params, task, pair.z, a, b), pair.z, a, b, level + 1);
+    const u32 right_a = i & 1, right_b = i >> 1 & 1;
+    bool exists = i < n;
+    u32 a = 0, b = 0, of = 0;
+    if (exists) {
+      const uint4 pair = task.nodes[level & 1][i / 4];
+      const u32 left_a = params.node_links[pair.x].x, left_b = params.node_links[pair.y].x;
+      exists = (left_a || !right_a) && (left_b || !right_b) && !(pair.x == pair.y && right_a && !right_b);
+      a = left_a ? left_a + right_a : pair.x, b = left_b ? left_b + right_b : pair.y, of = pair.z;
     }
+    keep_nodes(params, task, exists && may_improve(params, task, of, a, b), of, a, b, level + 1);
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gpu/nearest_leaves.cuh"
+#include "gpu/nearest_inside.cuh"
 #include "gpu/nearest_launch.cuh"
+#include "gpu/nearest_leaves.cuh"
 
 namespace hpccd::gpu {
 
@@ -22,7 +23,7 @@ void launch_nearest(const LaunchParams<T>& params, const NearestTask& task, u32 
   stages.mark("bounds_of_pairs");
   for (u32 level = 0; level < levels; ++level) {
     nearest_nodes_kernel<<<static_cast<unsigned>(4 * stages.multiprocessors), threads, 0, stages.stream>>>(params, task,
-                                                                                                        level);
+                                                                                                           level);
     check_launch("nearest_nodes_kernel");
   }
   stages.mark("traverse");
@@ -32,6 +33,15 @@ void launch_nearest(const LaunchParams<T>& params, const NearestTask& task, u32 
   check_launch("nearest_results_kernel");
 }
 
+template <class T>
+void launch_inside(const LaunchParams<T>& params, const InsideTask& task, const Stages& stages) {
+  inside_kernel<<<blocks_for(task.n, inside_warps), 32 * inside_warps, 0, stages.stream>>>(params, task);
+  check_launch("inside_kernel");
+  stages.mark("containment");
+}
+
+template void launch_inside(const LaunchParams<float>&, const InsideTask&, const Stages&);
+template void launch_inside(const LaunchParams<double>&, const InsideTask&, const Stages&);
 template void launch_nearest(const LaunchParams<float>&, const NearestTask&, u32, bool, const Stages&);
 template void launch_nearest(const LaunchParams<double>&, const NearestTask&, u32, bool, const Stages&);
 

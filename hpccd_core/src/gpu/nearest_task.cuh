@@ -51,10 +51,10 @@ struct NearestCounters {
 struct NearestTask {
   u32 n_pairs, n_all;  // of meshes; in all worlds
   const SearchedMeshes* meshes;
-  const NodeContent* contents;
+  const NodeContent *contents, *leaf_contents;  // of nodes, of leaves
   NearestSoFar* so_far;
-  uint4* nodes[2];   // a, b, number of the pair of meshes
-  uint4* leaves;     // the same
+  uint4* nodes[2];  // a, b, number of the pair of meshes
+  uint4* leaves;    // the same
   uint4* samples;
   uint4* undecided;  // number, kind, first, second
   u64 node_capacity, leaf_capacity, sample_capacity, undecided_capacity;
@@ -62,6 +62,17 @@ struct NearestTask {
   Thicknesses thickness;
   NearestOfMeshes* results;
   UndecidedNearest* undecided_results;
+};
+
+// A vertex whose winding number with respect to a mesh is asked.
+struct VertexAndMesh {
+  u32 world, vertex, root;
+};
+
+struct InsideTask {
+  u32 n;
+  const VertexAndMesh* asked;
+  std::int32_t* numbers;
 };
 
 __device__ inline double limit_bits_to_double(u64 bits) { return __longlong_as_double(static_cast<long long>(bits)); }

@@ -88,8 +88,7 @@ __device__ inline void offer(const NearestTask& task, bool wanted, u32 of, doubl
     for (int d = 16; d > 0; d /= 2) least = fmin(least, __shfl_xor_sync(all_lanes, least, d));
     u64 first = mine && distance == least ? key : no_pair;
     for (int d = 16; d > 0; d /= 2) first = min(first, __shfl_xor_sync(all_lanes, first, d));
-    if (mine && distance == least && key == first)
-      offer_locked(task.so_far[now], distance, key, without_thickness);
+    if (mine && distance == least && key == first) offer_locked(task.so_far[now], distance, key, without_thickness);
     __syncwarp();
     left &= ~__ballot_sync(all_lanes, mine);
   }
@@ -97,8 +96,8 @@ __device__ inline void offer(const NearestTask& task, bool wanted, u32 of, doubl
 
 // Tests one pair per lane. All lanes must call.
 template <Kind kind, class T>
-__device__ __noinline__ void test_nearest(const LaunchParams<T>& params, const NearestTask& task, bool valid, uint2 pair,
-                                          u32 of) {
+__device__ __noinline__ void test_nearest(const LaunchParams<T>& params, const NearestTask& task, bool valid,
+                                          uint2 pair, u32 of) {
   bool near = false, undecided = false;
   double distance = 0, lack = 0;
   if (valid) {

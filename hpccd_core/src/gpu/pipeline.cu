@@ -93,6 +93,16 @@ class DevicePipeline : public Pipeline {
     return vertices.is_double ? find_nearest<double>(vertices, pairs, version, pool)
                               : find_nearest<float>(vertices, pairs, version, pool);
   }
+  std::vector<std::int32_t> windings_of(const std::vector<VertexInMesh>& vertices) override {
+    std::vector<std::int32_t> numbers;
+    with_last_frame([&](auto params) {
+      tree_.fill(params);
+      const InsideTask task = nearest_.ask(vertices, stream_);
+      launch_inside(params, task, on_stream());
+      numbers = nearest_.numbers(task, stream_);
+    });
+    return numbers;
+  }
   bool run_for_earliest(Positions t0, Positions t1, Pairs pairs, Best best, ThreadPool& pool) override {
     begin();
     best_ = best;
@@ -376,7 +386,7 @@ void DevicePipeline::launch(LaunchParams<T>& params) {
 
 template <class T>
 void DevicePipeline::launch_refit(LaunchParams<T>& params) {
-  refit_kernel<<<blocks_for(std::size_t{params.all_leaves()} * 32, 128), 128, 0, on_>>>(params);
+  refit_kernel<<<blocks_for(std::size_t{params.all_leaves()} * refit_lanes, 128), 128, 0, on_>>>(params);
   check_launch("refit_kernel");
 }
 
@@ -649,9 +659,9 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
   s["leaf_pairs"] = c.leaf_pairs;
   s["gpu_passes"] = passes_;
   s["gpu_segments"] = lists_.n_segments();
-  s["gpu_bytes"] = scene_.bytes() + tree_.bytes() + nearest_.bytes() + positions_.bytes() + motion_.bytes() + leaf_pairs_.bytes() +
-                   lists_.bytes() + contacts_.bytes() + places_.bytes() + near_.bytes() + hints_.bytes() +
-                   points_.bytes();
+  s["gpu_bytes"] = scene_.bytes() + tree_.bytes() + nearest_.bytes() + positions_.bytes() + motion_.bytes() +
+                   leaf_pairs_.bytes() + lists_.bytes() + contacts_.bytes() + places_.bytes() + near_.bytes() +
+                   hints_.bytes() + points_.bytes();
   if (for_earliest() || goal_ == Goal::near_list) s["near_pairs"] = near_.size();
   if (goal_ == Goal::nearest) s["leaf_pairs"] = nearest_.counters().leaves, s["candidates"] = nearest_.counters().tests;
   return s;

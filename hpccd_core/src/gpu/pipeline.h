@@ -92,6 +92,8 @@ class Pipeline {
   // The nearest features of each of these pairs of meshes, in each world. `version` changes with the pairs.
   virtual NearestPairsFound find_nearest(Positions vertices, const std::vector<PairToSearch>& pairs,
                                          std::uint64_t version, ThreadPool& pool) = 0;
+  // Then: the winding numbers of vertices, or undecided_winding.
+  virtual std::vector<std::int32_t> windings_of(const std::vector<VertexInMesh>& vertices) = 0;
   // After run(): the pairs left to the exact fallback on the CPU, the first feature of each numbered through all
   // worlds.
   virtual const std::vector<Candidate>& undecided() const = 0;

@@ -59,26 +59,31 @@ __device__ bool for_faces_of_mesh(const LaunchParams<T>& params, u32 mesh, Meets
 __device__ inline double least_of(double a, double b, double c) { return fmin(fmin(a, b), c); }
 __device__ inline double most_of(double a, double b, double c) { return fmax(fmax(a, b), c); }
 
+// Adds the crossing of the ray from p along the first axis with a face. False if only integers can decide.
+__device__ inline bool add_crossing(const Vec3<double>& p, const Vec3<double> (&f)[3], std::int32_t& number) {
+  if (p.y < least_of(f[0].y, f[1].y, f[2].y) || p.y > most_of(f[0].y, f[1].y, f[2].y) ||
+      p.z < least_of(f[0].z, f[1].z, f[2].z) || p.z > most_of(f[0].z, f[1].z, f[2].z) ||
+      p.x > most_of(f[0].x, f[1].x, f[2].x))
+    return true;
+  const Vec3<double> q[4] = {p, f[0], f[1], f[2]};
+  const Crossing c = crossing(q);
+  if (c.turn != 0 && c.ahead > 0) number += c.turn;
+  return c.certain;
+}
+
+// Whether the ray may meet a box.
+__device__ inline bool meets_ray(const PointOnDevice& point, const DeviceBox& box) {
+  const float *low = box.low[0].x, *high = box.high[0].x;
+  return point.at[1] >= low[1] && point.at[1] <= high[1] && point.at[2] >= low[2] && point.at[2] <= high[2] &&
+         point.at[0] <= high[0];
+}
+
 template <class T>
 __device__ std::int32_t winding_on_device(const LaunchParams<T>& params, u32 mesh, const PointOnDevice& point) {
   std::int32_t number = 0;
-  const auto meets_ray = [&](const DeviceBox& box) {
-    const float *low = box.low[0].x, *high = box.high[0].x;
-    return point.at[1] >= low[1] && point.at[1] <= high[1] && point.at[2] >= low[2] && point.at[2] <= high[2] &&
-           point.at[0] <= high[0];
-  };
-  const auto test = [&](u32, const Vec3<double>(&f)[3]) {
-    const Vec3<double>& p = point.exact;
-    if (p.y < least_of(f[0].y, f[1].y, f[2].y) || p.y > most_of(f[0].y, f[1].y, f[2].y) ||
-        p.z < least_of(f[0].z, f[1].z, f[2].z) || p.z > most_of(f[0].z, f[1].z, f[2].z) ||
-        p.x > most_of(f[0].x, f[1].x, f[2].x))
-      return true;
-    const Vec3<double> q[4] = {p, f[0], f[1], f[2]};
-    const Crossing c = crossing(q);
-    if (c.turn != 0 && c.ahead > 0) number += c.turn;
-    return c.certain;
-  };
-  return for_faces_of_mesh(params, mesh, meets_ray, test) ? number : undecided_winding;
+  const auto meets = [&](const DeviceBox& box) { return meets_ray(point, box); };
+  const auto test = [&](u32, const Vec3<double>(&f)[3]) { return add_crossing(point.exact, f, number); };
+  return for_faces_of_mesh(params, mesh, meets, test) ? number : undecided_winding;
 }
 
 template <class T>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// bvh/refit.cpp on the device: one warp per leaf; the last warp that arrives at a node continues with its parent
+// bvh/refit.cpp on the device: a few lanes per leaf; the last of them that arrive at a node continue with its parent
 // (Karras 2012).
 #pragma once
 
@@ -9,21 +9,27 @@
 
 namespace hpccd::gpu {
 
-// The box of a leaf, in every lane; by one warp. `leaf` is numbered through all worlds.
+// Lanes of a leaf: most leaves have nine or ten corners.
+inline constexpr u32 refit_lanes = 8;
+
+__device__ inline u32 leaf_of_lanes() { return (blockIdx.x * blockDim.x + threadIdx.x) / refit_lanes; }
+
+// The box of a leaf, in each of its lanes. `leaf` is numbered through all worlds.
 template <class T>
 __device__ DeviceBox refit_leaf(const LaunchParams<T>& params, u32 leaf, u32 world) {
-  const u32 lane = lane_number(), own = leaf - world * params.n_leaves;
+  const u32 lane = threadIdx.x % refit_lanes, own = leaf - world * params.n_leaves;
+  const u32 lanes = ((1u << refit_lanes) - 1) << (lane_number() - lane);
   const DeviceLeaf l = params.leaves[own];
   const Bound top{{INFINITY, INFINITY, INFINITY}, 0}, bottom{{-INFINITY, -INFINITY, -INFINITY}, 0};
   DeviceBox whole{{top, top}, {bottom, bottom}};
-  if (lane < l.n_corners())
-    whole = load_point<true>(&params.points[world * params.n_vertices + params.corners[l.first_corner + lane]]);
-  for (int d = 16; d > 0; d /= 2) {
+  for (u32 i = lane; i < l.n_corners(); i += refit_lanes)
+    include(whole, load_point<true>(&params.points[world * params.n_vertices + params.corners[l.first_corner + i]]));
+  for (int d = refit_lanes / 2; d > 0; d /= 2) {
     DeviceBox other;
     for (int end = 0; end < 2; ++end)
       for (int k = 0; k < 3; ++k) {
-        other.low[end].x[k] = __shfl_xor_sync(all_lanes, whole.low[end].x[k], d);
-        other.high[end].x[k] = __shfl_xor_sync(all_lanes, whole.high[end].x[k], d);
+        other.low[end].x[k] = __shfl_xor_sync(lanes, whole.low[end].x[k], d);
+        other.high[end].x[k] = __shfl_xor_sync(lanes, whole.high[end].x[k], d);
       }
     include(whole, other);
   }
@@ -34,17 +40,17 @@ __device__ DeviceBox refit_leaf(const LaunchParams<T>& params, u32 leaf, u32 wor
 
 template <class T>
 __global__ void refit_leaves_kernel(LaunchParams<T> params) {
-  const u32 leaf = (blockIdx.x * blockDim.x + threadIdx.x) / 32;
+  const u32 leaf = leaf_of_lanes();
   if (leaf < params.all_leaves()) refit_leaf(params, leaf, params.by_leaves(leaf));
 }
 
 template <class T>
 __global__ void refit_kernel(LaunchParams<T> params) {
-  const u32 leaf = (blockIdx.x * blockDim.x + threadIdx.x) / 32;
+  const u32 leaf = leaf_of_lanes();
   if (leaf >= params.all_leaves() || over(params)) return;
   const u32 world = params.by_leaves(leaf);
   const DeviceBox whole = refit_leaf(params, leaf, world);
-  if (lane_number() != 0) return;
+  if (threadIdx.x % refit_lanes != 0) return;
   DeviceBox* boxes = params.node_boxes + static_cast<u64>(world) * params.n_nodes;
   u32* arrivals = params.node_arrivals + static_cast<u64>(world) * params.n_nodes;
   u32 node = params.leaf_nodes[leaf - world * params.n_leaves], parent = params.node_parent[node];

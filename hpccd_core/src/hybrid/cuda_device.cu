@@ -137,7 +137,7 @@ class CudaTestDevice final : public TestDevice {
   template <class T>
   void refit() {
     const LaunchParams<T> params = launch_params<T>();
-    refit_leaves_kernel<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, upload_>>>(params);
+    refit_leaves_kernel<<<blocks_for(std::size_t{params.n_leaves} * refit_lanes, 128), 128, 0, upload_>>>(params);
     check_launch("refit_leaves_kernel");
     if (scene_.query_now() == gpu::Query::contacts) launch_leaf_kdops(params, upload_);
     check(cudaEventRecord(ready_, upload_), "cudaEventRecord");

@@ -42,6 +42,10 @@ class Containment {
   void decide(std::span<Gap> gaps, const Tree& tree, const MotionBounds& snapshot, const PlacedMeshes* placed,
               ContainmentMemory& memory, ThreadPool& pool) const;
 
+  // One vertex of each connected component of a mesh that is in a pair.
+  std::span<const std::uint32_t> components(std::uint32_t mesh) const {
+    return {vertices_.data() + first_[mesh], vertices_.data() + first_[mesh + 1]};
+  }
   // Whether one mesh may lie inside another, as far as their boxes tell.
   bool possible(std::uint32_t inner, std::uint32_t outer, bool boxes_meet, bool within_box) const {
     return closed_[outer] && (components(inner).size() == 1 ? within_box : boxes_meet);
@@ -51,9 +55,6 @@ class Containment {
 
  private:
   struct Question;
-  std::span<const std::uint32_t> components(std::uint32_t mesh) const {
-    return {vertices_.data() + first_[mesh], vertices_.data() + first_[mesh + 1]};
-  }
   std::deque<Question> questions_of(std::span<Gap> gaps, const MotionBounds& snapshot,
                                     const PlacedMeshes* placed) const;
 

@@ -90,7 +90,8 @@ TEST_F(NearestOnDevice, OfSolidsApartTouchingNestedAndIntersecting) {
       expect_same_distances(
           frames_of({test::sphere(24, 1), test::moved(test::sphere(17, 1), {distance, 0.3 * distance, 0.1})}, seed, 4,
                     0.05, 0.01));
-    expect_same_distances(frames_of({test::sphere(20, 2), test::sphere(9, 0.3), test::sheet(12, 0.3)}, seed, 4, 0.4, 0));
+    expect_same_distances(
+        frames_of({test::sphere(20, 2), test::sphere(9, 0.3), test::sheet(12, 0.3)}, seed, 4, 0.4, 0));
   }
 }
 
@@ -98,7 +99,8 @@ TEST_F(NearestOnDevice, OfSheetsWithinThemselves) {
   for (const unsigned seed : {1u, 2u}) {
     // Without noise many pairs are at the same distance.
     for (const double noise : {0.0, 0.05, 0.4})
-      expect_same_distances(frames_of({test::sheet(30, 1), test::moved(test::sheet(23, 1), {3, 4, 0.7})}, seed, 3, 0.3, noise));
+      expect_same_distances(
+          frames_of({test::sheet(30, 1), test::moved(test::sheet(23, 1), {3, 4, 0.7})}, seed, 3, 0.3, noise));
     expect_same_distances(frames_of({test::sheet(2, 1)}, seed, 2, 0.3, 0.1));
     expect_same_distances(frames_of({test::sheet(3, 1)}, seed, 2, 0.3, 0));
   }
@@ -107,9 +109,10 @@ TEST_F(NearestOnDevice, OfSheetsWithinThemselves) {
 TEST_F(NearestOnDevice, OfSoupRopesAndPoints) {
   for (const unsigned seed : {1u, 2u, 3u, 4u}) {
     Random random(seed);
-    const std::vector<Body> bodies{test::soup(random, 60, 0.4), test::rope(random, 40), test::points(random, 50),
-                                   test::moved(test::soup(random, 5, 0.02), {1, 1, 3}), test::rope(random, 3),
-                                   test::with_isolated_vertices(test::sheet(6, 0.2), random, 9)};
+    const std::vector<Body> bodies{
+        test::soup(random, 60, 0.4), test::rope(random, 40),
+        test::points(random, 50),    test::moved(test::soup(random, 5, 0.02), {1, 1, 3}),
+        test::rope(random, 3),       test::with_isolated_vertices(test::sheet(6, 0.2), random, 9)};
     expect_same_distances(frames_of(bodies, seed, 4, 1, 0.02));
   }
 }
@@ -119,7 +122,8 @@ TEST_F(NearestOnDevice, OfTheSamePlacesAndDegenerateTriangles) {
     Random random(seed);
     Body flat = test::sheet(12, 1);
     for (std::size_t i = 0; i < flat.positions.size(); ++i) flat.positions[i] = std::round(0.4 * flat.positions[i]);
-    expect_same_distances(frames_of({flat, test::moved(flat, {0, 0, 1}), test::moved(flat, {0.5, 0, 0})}, seed, 3, 0, 0));
+    expect_same_distances(
+        frames_of({flat, test::moved(flat, {0, 0, 1}), test::moved(flat, {0.5, 0, 0})}, seed, 3, 0, 0));
     expect_same_distances(frames_of({flat, test::moved(test::soup(random, 40, 1e-9), {0, 0, 0.5})}, seed, 3, 0.3, 0));
     expect_same_distances(frames_of({test::sphere(12, 1), test::sphere(12, 1)}, seed, 2, 0, 0));
   }
