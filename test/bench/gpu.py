@@ -9,6 +9,7 @@
   threads   Fig. 6 of Kim et al. 2009: threads by GPUs, default and published method
   device    from the device to the host, on the device, and in a CUDA graph (PyTorch or CuPy)
   large     the same for two nets that collide nearly edge on edge (--sizes)
+  distances smallest distances in two frames in turn, also of two large deforming spheres (--spheres)
   worlds    contacts of a folded garment, and near pairs in a folded sheet, many times in one call (--worlds)
 
 Fails if results differ from the CPU's, or if a device left a frame to the CPU.
@@ -17,6 +18,7 @@ Fails if results differ from the CPU's, or if a device left a frame to the CPU.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import time
 from collections.abc import Callable
 from functools import partial
@@ -30,7 +32,7 @@ from hpccd_core._core import MOST_WORLDS
 from hpccd_ros.bench.sources import Step
 from hpccd_ros.scenes.scene import Mesh
 
-OF_SCENES = ("frames", "threads", "device")
+OF_SCENES = ("frames", "threads", "device", "distances")
 PARTS = (*OF_SCENES, "large", "worlds")
 TIERS = ("balanced", "exact")
 NEAR = 0.35  # of proximity in folded sheets, whose vertices are 1 apart
@@ -59,6 +61,15 @@ WORLDS = {
     "GPU, ms": "median_ms",
     "us a world": "us_a_world",
 }
+DISTANCES = {
+    "scene": "scene",
+    "triangles": "triangles",
+    "pairs of meshes": "pairs",
+    "CPU, ms": "cpu_median_ms",
+    "host to host": "host_median_ms",
+    "device to host": "median_ms",
+    "p95": "p95_ms",
+}
 THREADS = {key: key for key in ("scene", "method", "threads", "gpus", "median_ms", "speedup")}
 
 
@@ -67,20 +78,22 @@ def configure(parser):
     add = parser.add_argument
     add("--parts", default=",".join(PARTS), metavar="NAME,...", help="default: %(default)s")
     add("--sizes", default="224,708,1415", metavar="N,...", help="vertices along a side of each net")
+    add("--spheres", default="500,1369", metavar="N,...", help="rings of each sphere, of 4 N^2 triangles")
     add("--worlds", default="64,1024,4096,8192", metavar="W,...", help="how many in a call (default: %(default)s)")
 
 
 def run(args) -> lab.Report:
     parts = lab.listed("--parts", args.parts, PARTS)
-    sizes, worlds = (lab.numbers(f"--{name}", getattr(args, name), int) for name in ("sizes", "worlds"))
+    named = ("sizes", "spheres", "worlds")
+    sizes, spheres, worlds = (lab.numbers(f"--{name}", getattr(args, name), int) for name in named)
     if sizes[0] < 2:
         raise lab.UserError(f"--sizes {args.sizes}: a net has at least 2 vertices along a side")
     if worlds[-1] > MOST_WORLDS:
         raise lab.UserError(f"--worlds {args.worlds}: a detector takes at most {MOST_WORLDS:,}; name fewer")
     if "gpu" not in hc.backends():
         raise lab.UserError(f"no usable GPU: {hc.gpu_status()['reason']}")
-    if set(parts) & {"device", "large", "worlds"}:
-        library("--parts device, large or worlds")
+    if set(parts) & {"device", "distances", "large", "worlds"}:
+        library("--parts device, distances, large or worlds")
     if not set(parts) & set(OF_SCENES):
         args.default_sources = ()
     result, sources = lab.begin(args)
@@ -90,6 +103,11 @@ def run(args) -> lab.Report:
                 measure(result, args, part, source.name, source.step(0), accuracy)
         if "threads" in parts:
             _threads(result, args, source.name, source.step(0))
+        if "distances" in parts:
+            _distances(result, args, source.name, source.step(source.n_steps // 2))
+    for n in spheres if "distances" in parts else ():
+        for gap in (0.1, -0.3):
+            _distances(result, args, f"spheres {n}, {gap:+g}", shapes.two_spheres(n, gap))
     for n in sizes if "large" in parts else ():
         _on_device(result, args, "large", f"nets {n}", shapes.two_nets(n), "exact")
     for count in worlds if "worlds" in parts else ():
@@ -97,6 +115,7 @@ def run(args) -> lab.Report:
     for title, columns, of in (
         ("ms a call", COLUMNS, ("frames", "device", "large")),
         ("Fig. 6: ms, and times one CPU thread with the published method", THREADS, ("threads",)),
+        ("smallest distances, ms a call", DISTANCES, ("distances",)),
         ("many worlds in one call, positions and results on the device", WORLDS, ("worlds",)),
     ):
         if rows := [row for row in result.rows if row["part"] in of]:
@@ -180,6 +199,36 @@ def _on_device(result, args, part, name, step, accuracy):
         graph_median_ms=in_graph["median_ms"],
         bytes=held,
         stages_ms=_stages(staged, lambda: staged.detect(*ends, stream=stream)),
+    )
+
+
+def _distances(result, args, name, step):
+    """Positions of two frames in turn, so that each call refits and the last nearest pairs are not the next ones."""
+    arrays, scene = library("--parts distances"), step.scene()
+    frames = step.vertices_t0, step.vertices_t1
+    there = [arrays.array(xyz) for xyz in frames]
+    took, gaps = {}, {}
+    for way, backend, given in (("cpu", "cpu", frames), ("host", "gpu", frames), ("device", "gpu", there)):
+        detector, turns = hc.Detector(scene, backend=backend, threads=args.threads), itertools.cycle(given)
+        took[way], _ = call_times(lambda of=detector, turns=turns: of.distances(next(turns)), args.repeat)
+        gaps[way] = [
+            [(gap.distance, gap.kind, gap.features, gap.inside) for gap in detector.distances(x)] for x in given
+        ]
+        _check(result, f"distances, {name}, {way}", detector, gaps[way] == gaps["cpu"])
+    held = detector.stats["gpu_bytes"]
+    detector = None
+    staged, turns = StagesDetector(scene, backend="gpu", threads=args.threads), itertools.cycle(there)
+    result.add(
+        part="distances",
+        scene=name,
+        triangles=step.triangles,
+        pairs=len(gaps["cpu"][0]),
+        distance=[min((gap[0] for gap in frame), default=None) for frame in gaps["cpu"]],
+        cpu_median_ms=took["cpu"]["median_ms"],
+        host_median_ms=took["host"]["median_ms"],
+        **took["device"],
+        bytes=held,
+        stages_ms=_stages(staged, lambda: staged.distances(next(turns))),
     )
 
 

@@ -44,6 +44,45 @@ def two_nets(n: int) -> Step:
     )
 
 
+def sphere(rings: int, phase: float) -> tuple[np.ndarray, np.ndarray]:
+    """Faces and vertices of a closed sphere of radius 1 that waves with the phase: rings of 2 rings vertices."""
+    width = 2 * rings
+    polar, around = np.meshgrid(
+        np.pi * np.arange(1, rings + 1) / (rings + 1), 2 * np.pi * np.arange(width) / width, indexing="ij"
+    )
+    radius = 1 + 0.03 * np.sin(5 * around + phase) * np.sin(4 * polar + 0.5 * phase)
+    xyz = np.stack(
+        [radius * np.sin(polar) * np.cos(around), radius * np.sin(polar) * np.sin(around), -radius * np.cos(polar)], -1
+    )
+    south, north, i = rings * width, rings * width + 1, np.arange(width)
+    low = (np.arange(rings - 1)[:, None] * width + i).ravel()
+    after = (np.arange(rings - 1)[:, None] * width + (i + 1) % width).ravel()
+    last = (rings - 1) * width
+    faces = [
+        np.stack([np.full(width, south), (i + 1) % width, i], -1),
+        np.stack([np.full(width, north), last + i, last + (i + 1) % width], -1),
+        np.stack([low, after, after + width], -1),
+        np.stack([low, after + width, low + width], -1),
+    ]
+    poles = [[0, 0, -1], [0, 0, 1]]
+    return np.concatenate(faces).astype(np.uint32), np.concatenate([xyz.reshape(-1, 3), poles])
+
+
+def two_spheres(rings: int, gap: float) -> Step:
+    """Two deforming spheres, each tested against the other only; about `gap` apart, below 0 they intersect."""
+    way = np.array([0.8, 0.5, 0.33])
+    way *= (2 + gap) / np.linalg.norm(way)
+    faces = sphere(rings, 0)[0]
+    ends = [
+        np.concatenate([sphere(rings, 0.05 * k)[1], sphere(rings, 1 + 0.04 * k)[1] + way]).astype(np.float32)
+        for k in range(2)
+    ]
+    meshes = tuple(
+        Mesh(name, faces, 2 * rings * rings + 2, self_collision=False) for name in ("sphere", "other sphere")
+    )
+    return Step(meshes, 0, *ends)
+
+
 def garment() -> np.ndarray:
     """Faces of a garment of 2,700 triangles."""
     return sheet(COLUMNS, ROWS)
