@@ -25,6 +25,12 @@ struct NearestSpace {
   u32 tests;
 };
 
+// What other warps change, the same for all lanes. All lanes must call.
+__device__ inline u64 fresh_for_warp(const u64* at) { return __shfl_sync(all_lanes, fresh(at), 0); }
+__device__ inline float reach_for_warp(const NearestSoFar& s) {
+  return reach_of(s, limit_bits_to_double(fresh_for_warp(&s.limit)));
+}
+
 inline constexpr u32 no_edge = 0xFFFFFFFFu;
 
 __device__ inline SnapshotBox snapshot_box(const DeviceBox& b) {
@@ -235,8 +241,8 @@ struct NearestOfLeaves {
                     box_b = load_box(&params.leaf_boxes[first_leaf + pair.y]);
     const NodeContent in_a = task.leaf_contents[pair.x], in_b = task.leaf_contents[pair.y];
     const SearchedLeaf a(params, pair.x, world), b(params, pair.y, world);
-    const u64 crossing = fresh(&so_far.crossing);
-    float reach = reach_of(so_far, limit_of(so_far));
+    const u64 crossing = fresh_for_warp(&so_far.crossing);
+    float reach = reach_for_warp(so_far);
     const bool touching = same || near_in_snapshot(box_a, box_b, 0);
     u32 last_edge = no_edge;
     if (crossing != no_pair) {
@@ -247,12 +253,12 @@ struct NearestOfLeaves {
       if (!touching && farther_apart(a, b, box_a, box_b, reach)) return;
       // Later pairs of features give a better bound.
       const SearchedMeshes& meshes = task.meshes[of - world * task.n_pairs];
-      if (meshes.bounded && fresh(&so_far.key) == no_pair &&
+      if (meshes.bounded && fresh_for_warp(&so_far.key) == no_pair &&
           !((in_a.kinds | in_b.kinds) & NodeContent::isolated_vertices)) {
         const float square = square_of_corners(a, b);
         if (lane_number() == 0) lower_limit_by_box(so_far, meshes.most_lack, square);
         __syncwarp();
-        reach = reach_of(so_far, limit_of(so_far));
+        reach = reach_for_warp(so_far);
       }
     }
     const NearCounts of_a = stage_near(params, s, 0, a, snapshot_box(box_b), same, reach, last_edge);
@@ -262,7 +268,7 @@ struct NearestOfLeaves {
     const bool filtered = params.filtered && are_filtered(params, a.leaf, b.leaf);
 #pragma unroll 1
     for (u32 i = touching ? 0 : 2; i < 5; ++i) {
-      if (i == 2 && fresh(&so_far.crossing) != no_pair) return;
+      if (i == 2 && fresh_for_warp(&so_far.crossing) != no_pair) return;
       add(product(i, of_a, of_b, same), same && i == 4, of_a.edges, i < 2 ? 0 : reach, of, world, filtered);
     }
   }
