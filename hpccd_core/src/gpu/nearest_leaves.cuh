@@ -17,12 +17,28 @@ struct WaitingPairs {
   u32 of[room];
 };
 
+// Features of a leaf. Their bounds along the axes reject most pairs, so that the other words are rarely read.
+struct NearestFeatures {
+  float4 low[LeafOrder::most], high[LeafOrder::most], slanted_low[LeafOrder::most], slanted_high[LeafOrder::most];
+
+  __device__ void put(u32 at, const SnapshotBox& b, const FeatureNumbers& n) {
+    low[at] = {b.low[0], b.low[1], b.low[2], __uint_as_float(n.vertex[0])};
+    high[at] = {b.high[0], b.high[1], b.high[2], __uint_as_float(n.vertex[1])};
+    slanted_low[at] = {b.low[3], b.low[4], b.low[5], __uint_as_float(n.vertex[2])};
+    slanted_high[at] = {b.high[3], b.high[4], b.high[5], __uint_as_float(n.number)};
+  }
+};
+
+__device__ inline float3 gaps_of(float4 low_a, float4 high_a, float4 low_b, float4 high_b) {
+  return {fmaxf(low_b.x - high_a.x, low_a.x - high_b.x), fmaxf(low_b.y - high_a.y, low_a.y - high_b.y),
+          fmaxf(low_b.z - high_a.z, low_a.z - high_b.z)};
+}
+__device__ inline float positive_square(float x) { return x > 0 ? x * x : 0; }
+
 struct NearestSpace {
-  StagedFeatures side[2];  // the features of each leaf that are near the other leaf
+  NearestFeatures side[2];  // the features of each leaf that are near the other leaf
   StagedCorners corners;
   WaitingPairs waiting[3];  // by kind
-  u32 n[3];                 // of them
-  u32 tests;
 };
 
 // What other warps change, the same for all lanes. All lanes must call.
@@ -145,16 +161,19 @@ struct NearestOfLeaves {
   const LaunchParams<T>& params;
   const NearestTask& task;
   NearestSpace& s;
+  u32 n_waiting = 0;  // eight bits by kind: an array with a variable index would lie in memory
+  u32 tests = 0;
+
+  __device__ u32 waiting(u32 k) const { return n_waiting >> 8 * k & 0xFF; }
 
   // A warp of the candidates of one kind that wait, or all of fewer.
   __device__ __forceinline__ void test(u32 k) {
-    const u32 now = min(s.n[k], 32u), rest = s.n[k] - now;
+    const u32 now = min(waiting(k), 32u), rest = waiting(k) - now;
     const bool valid = lane_number() < now;
     const uint2 pair = valid ? s.waiting[k].pairs[rest + lane_number()] : uint2{0, 0};
     const u32 of = valid ? s.waiting[k].of[rest + lane_number()] : 0;
     __syncwarp();
-    if (lane_number() == 0) s.n[k] = rest, s.tests += now;
-    __syncwarp();
+    n_waiting -= now << 8 * k, tests += now;
     if (k == static_cast<u32>(Kind::edge_face)) test_crossing(params, task, valid, pair, of);
     if (k == static_cast<u32>(Kind::edge_edge)) test_nearest<Kind::edge_edge>(params, task, valid, pair, of);
     if (k == static_cast<u32>(Kind::vertex_face)) test_nearest<Kind::vertex_face>(params, task, valid, pair, of);
@@ -164,9 +183,20 @@ struct NearestOfLeaves {
   // The lane's candidate: in side x the i-th staged feature, in side y the j-th.
   __device__ __forceinline__ bool candidate(Kind kind, u32 x, u32 i, u32 y, u32 j, float reach, u32 world,
                                             uint2& pair) const {
-    const FeatureNumbers a = s.side[x].numbers_of(i), b = s.side[y].numbers_of(j);
-    if (share_a_vertex(a, b) || !within_reach(s.side[x].box(i), s.side[y].box(j), reach)) return false;
-    pair = {a.number, b.number};
+    const NearestFeatures &a = s.side[x], &b = s.side[y];
+    const float4 low_a = a.low[i], high_a = a.high[i], low_b = b.low[j], high_b = b.high[j];
+    const float3 along = gaps_of(low_a, high_a, low_b, high_b);
+    const float square = positive_square(along.x) + positive_square(along.y) + positive_square(along.z);
+    if (square > reach * reach) return false;
+    const float4 slanted_a = a.slanted_low[i], end_a = a.slanted_high[i], slanted_b = b.slanted_low[j],
+                 end_b = b.slanted_high[j];
+    const float3 slanted = gaps_of(slanted_a, end_a, slanted_b, end_b);
+    if (fmaxf(fmaxf(slanted.x, slanted.y), slanted.z) > slanted_reach(reach)) return false;
+    const auto vertices = [](float4 low, float4 high, float4 other) {
+      return FeatureNumbers{{__float_as_uint(low.w), __float_as_uint(high.w), __float_as_uint(other.w)}, 0};
+    };
+    if (share_a_vertex(vertices(low_a, high_a, slanted_a), vertices(low_b, high_b, slanted_b))) return false;
+    pair = {__float_as_uint(end_a.w), __float_as_uint(end_b.w)};
     if (kind == Kind::vertex_face) pair.x -= world * params.n_vertices;  // the number of a vertex is that of all worlds
     if (kind == Kind::edge_edge && pair.y < pair.x) pair = {pair.y, pair.x};
     if (params.edge_kinds) {
@@ -223,13 +253,13 @@ struct NearestOfLeaves {
       if (near && filtered) near = !ignored(p.kind, pair);
       const u32 mask = __ballot_sync(all_lanes, near);
       if (near) {
-        const u32 to = s.n[k] + __popc(mask & ((1u << lane_number()) - 1));
+        const u32 to = waiting(k) + __popc(mask & ((1u << lane_number()) - 1));
         s.waiting[k].pairs[to] = pair, s.waiting[k].of[to] = of;
       }
+      n_waiting += __popc(mask) << 8 * k;
+      if (waiting(k) < 32) continue;
       __syncwarp();
-      if (lane_number() == 0) s.n[k] += __popc(mask);
-      __syncwarp();
-      if (s.n[k] >= 32) test(k);
+      test(k);
     }
   }
 
@@ -276,15 +306,11 @@ struct NearestOfLeaves {
 
 template <class T>
 __global__ __launch_bounds__(32 * nearest_warps,
-                             5) void nearest_leaves_kernel(const __grid_constant__ LaunchParams<T> params,
+                             4) void nearest_leaves_kernel(const __grid_constant__ LaunchParams<T> params,
                                                            const __grid_constant__ NearestTask task, bool samples) {
   __shared__ NearestSpace spaces[nearest_warps];
   if (params.counters->bad != 0) return;
-  NearestSpace& space = spaces[threadIdx.x / 32];
-  if (lane_number() < 3) space.n[lane_number()] = 0;
-  if (lane_number() == 3) space.tests = 0;
-  __syncwarp();
-  NearestOfLeaves<T> search{params, task, space};
+  NearestOfLeaves<T> search{params, task, spaces[threadIdx.x / 32]};
   const uint4* list = samples ? task.samples : task.leaves;
   const u64 n = samples ? length(task.counters->samples, task.sample_capacity)
                         : length(task.counters->leaves, task.leaf_capacity);
@@ -292,9 +318,10 @@ __global__ __launch_bounds__(32 * nearest_warps,
 #pragma unroll 1
   for (u64 i = static_cast<u64>(blockIdx.x) * nearest_warps + threadIdx.x / 32; i < n; i += n_warps)
     search.search(list[i]);
+  __syncwarp();
   for (u32 k = 0; k < 3; ++k)
-    if (space.n[k] > 0) search.test(k);
-  if (lane_number() == 0 && space.tests) atomicAdd(&task.counters->tests, u64{space.tests});
+    if (search.waiting(k) > 0) search.test(k);
+  if (lane_number() == 0 && search.tests) atomicAdd(&task.counters->tests, u64{search.tests});
 }
 
 }  // namespace hpccd::gpu

@@ -77,6 +77,21 @@ __device__ __forceinline__ void keep_nodes(const LaunchParams<T>& params, const 
   if (nodes && at_node < task.node_capacity) task.nodes[level & 1][at_node] = {a, b, of, 0};
 }
 
+// An edge and a face that do not intersect any more: the ends of the edge are near the face.
+template <class T>
+__device__ inline void bound_by_ends(const LaunchParams<T>& params, const NearestTask& task, u32 of, uint2 pair) {
+  const u32 world = of / task.n_pairs;
+  const uint2 edge = __ldg(params.edges + pair.x);
+  NearestSoFar& s = task.so_far[of];
+  for (const u32 end : {edge.x, edge.y}) {
+    if (params.filtered && params.filter.vertex_face(end, pair.y)) continue;
+    const Nearness n = nearness<Kind::vertex_face>(params, world, {end, pair.y}, 1e307);
+    if (n.outcome != Outcome::yes) continue;
+    const double distance = n.distance + task.meshes[of - world * task.n_pairs].most_lack;
+    lower_limit(s, distance * (1 + 1e-14) + 2 * s.rounding);
+  }
+}
+
 // The last frame's nearest pair, at the positions of this frame.
 template <class T>
 __device__ inline void begin_with_last(const LaunchParams<T>& params, const NearestTask& task, u32 of, u64 key,
@@ -85,7 +100,10 @@ __device__ inline void begin_with_last(const LaunchParams<T>& params, const Near
   const u32 world = of / task.n_pairs;
   if (crossing != no_pair) {
     const uint2 pair{static_cast<u32>(crossing >> 32), static_cast<u32>(crossing)};
-    if (crossing_of(params, world, pair) == Outcome::yes) s.crossing = crossing;
+    if (crossing_of(params, world, pair) == Outcome::yes)
+      s.crossing = crossing;
+    else
+      bound_by_ends(params, task, of, pair);
   }
   if (key == no_pair) return;
   const bool edges = key >> 62 & 1;
@@ -123,7 +141,7 @@ __global__ void begin_nearest_kernel(const __grid_constant__ LaunchParams<T> par
   const bool searched = valid && meshes.root_a != no_node && meshes.root_b != no_node;
   keep_nodes(params, task, searched && may_improve(params, task, of, meshes.root_a, meshes.root_b), of, meshes.root_a,
              meshes.root_b, 0);
-  if (!searched || !meshes.same || task.so_far[of].limit != bits_of(1e307)) return;
+  if (!searched || !meshes.same || task.so_far[of].key != no_pair || task.so_far[of].crossing != no_pair) return;
   const u32 n = min(meshes.n_leaves, samples_of_mesh);
   const u64 at = atomicAdd(&task.counters->samples, u64{2} * n);
   for (u32 i = 0; i < n && at + 2 * i + 1 < task.sample_capacity; ++i) {
