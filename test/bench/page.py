@@ -297,19 +297,6 @@ TABLES = {
         | {"bytes per triangle": lambda row: row["bytes"] / row["triangles"]},
         lambda rows: [row for row in rows if row["part"] in ("device", "large") and row["accuracy"] == "exact"],
     ),
-    "device-distances": Table(
-        ("gpu-distances-h200",),
-        _same("scene", "triangles")
-        | {"pairs of meshes": "pairs"}
-        | {"CPU, ms": "cpu_median_ms", "host to host": "host_median_ms", "device to host": "median_ms"}
-        | {"refit": lambda row: row["stages_ms"]["gpu/refit"]}
-        | {
-            "search": lambda row: sum(
-                row["stages_ms"][f"gpu/{name}"] for name in ("bounds_of_pairs", "traverse", "nearest")
-            )
-        },
-        lambda rows: [row for row in rows if row["part"] == "distances"],
-    ),
     "latency": Table(
         ("ros-4-cores",),
         {"scene": "scene", "MB in, out": lambda row: f"{row['mb_in']:.2g}, {row['mb_out']:.2g}"}

@@ -296,8 +296,9 @@ def test_gpu(bench):
     status, result, _ = bench("gpu", *few, "--parts", "frames,threads")
     assert status == 0 and result["failures"] == [] and {r["part"] for r in result["rows"]} == {"frames", "threads"}
     pytest.importorskip("torch", reason="PyTorch is not installed: positions on the device are not measured")
-    status, result, _ = bench("gpu", *few, "--parts", "device,large,worlds")
+    status, result, _ = bench("gpu", *few, "--spheres", "6", "--parts", "device,distances,large,worlds")
     assert status == 0 and result["failures"] == []
+    assert sum(row["part"] == "distances" for row in result["rows"]) == 3
     detect = [row for row in result["rows"] if row.get("query") == "detect"]
     assert [row["worlds"] for row in detect] == [1, 3] and min(row["pairs"] for row in detect) > 0
 
