@@ -44,7 +44,7 @@ struct NearestSpace {
 // What other warps change, the same for all lanes. All lanes must call.
 __device__ inline u64 fresh_for_warp(const u64* at) { return __shfl_sync(all_lanes, fresh(at), 0); }
 __device__ inline float reach_for_warp(const NearestSoFar& s) {
-  return reach_of(s, limit_bits_to_double(fresh_for_warp(&s.limit)));
+  return reach_of(s, double_of(fresh_for_warp(&s.limit)));
 }
 
 inline constexpr u32 no_edge = 0xFFFFFFFFu;
@@ -174,7 +174,7 @@ struct NearestOfLeaves {
     const u32 of = valid ? s.waiting[k].of[rest + lane_number()] : 0;
     __syncwarp();
     n_waiting -= now << 8 * k, tests += now;
-    if (k == static_cast<u32>(Kind::edge_face)) test_crossing(params, task, valid, pair, of);
+    if (k == static_cast<u32>(Kind::edge_face)) test_intersection(params, task, valid, pair, of);
     if (k == static_cast<u32>(Kind::edge_edge)) test_nearest<Kind::edge_edge>(params, task, valid, pair, of);
     if (k == static_cast<u32>(Kind::vertex_face)) test_nearest<Kind::vertex_face>(params, task, valid, pair, of);
     __syncwarp();
@@ -271,12 +271,12 @@ struct NearestOfLeaves {
                     box_b = load_box(&params.leaf_boxes[first_leaf + pair.y]);
     const NodeContent in_a = task.leaf_contents[pair.x], in_b = task.leaf_contents[pair.y];
     const SearchedLeaf a(params, pair.x, world), b(params, pair.y, world);
-    const u64 crossing = fresh_for_warp(&so_far.crossing);
+    const u64 intersecting = fresh_for_warp(&so_far.intersecting);
     float reach = reach_for_warp(so_far);
     const bool touching = same || near_in_snapshot(box_a, box_b, 0);
     u32 last_edge = no_edge;
-    if (crossing != no_pair) {
-      last_edge = static_cast<u32>(crossing >> 32), reach = 0;
+    if (intersecting != no_pair) {
+      last_edge = static_cast<u32>(intersecting >> 32), reach = 0;
       if (!touching || min(in_a.least_edge, in_b.least_edge) > last_edge) return;
     } else if (!same) {
       if (!within_reach(box_a, box_b, reach)) return;
@@ -298,7 +298,7 @@ struct NearestOfLeaves {
     const bool filtered = params.filtered && are_filtered(params, a.leaf, b.leaf);
 #pragma unroll 1
     for (u32 i = touching ? 0 : 2; i < 5; ++i) {
-      if (i == 2 && fresh_for_warp(&so_far.crossing) != no_pair) return;
+      if (i == 2 && fresh_for_warp(&so_far.intersecting) != no_pair) return;
       add(product(i, of_a, of_b, same), same && i == 4, of_a.edges, i < 2 ? 0 : reach, of, world, filtered);
     }
   }

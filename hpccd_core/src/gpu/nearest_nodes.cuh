@@ -57,8 +57,8 @@ __device__ __forceinline__ bool may_improve(const LaunchParams<T>& params, const
   const u32 world = of / task.n_pairs;
   const SearchedMeshes& meshes = task.meshes[of - world * task.n_pairs];
   const DeviceBox box_a = box_of_node(params, world, a), box_b = box_of_node(params, world, b);
-  if (const u64 crossing = fresh(&s.crossing); crossing != no_pair)
-    return min(in_a.least_edge, in_b.least_edge) <= crossing >> 32 && (a == b || near_in_snapshot(box_a, box_b, 0));
+  if (const u64 intersecting = fresh(&s.intersecting); intersecting != no_pair)
+    return min(in_a.least_edge, in_b.least_edge) <= intersecting >> 32 && (a == b || near_in_snapshot(box_a, box_b, 0));
   if (a == b) return true;
   if (meshes.bounded) lower_limit_by_box(s, meshes.most_lack, square_of_farthest(box_a, box_b));
   return within_reach(box_a, box_b, reach_of(s, limit_of(s)));
@@ -95,13 +95,13 @@ __device__ inline void bound_by_ends(const LaunchParams<T>& params, const Neares
 // The last frame's nearest pair, at the positions of this frame.
 template <class T>
 __device__ inline void begin_with_last(const LaunchParams<T>& params, const NearestTask& task, u32 of, u64 key,
-                                       u64 crossing) {
+                                       u64 intersecting) {
   NearestSoFar& s = task.so_far[of];
   const u32 world = of / task.n_pairs;
-  if (crossing != no_pair) {
-    const uint2 pair{static_cast<u32>(crossing >> 32), static_cast<u32>(crossing)};
-    if (crossing_of(params, world, pair) == Outcome::yes)
-      s.crossing = crossing;
+  if (intersecting != no_pair) {
+    const uint2 pair{static_cast<u32>(intersecting >> 32), static_cast<u32>(intersecting)};
+    if (intersection_of(params, world, pair) == Outcome::yes)
+      s.intersecting = intersecting;
     else
       bound_by_ends(params, task, of, pair);
   }
@@ -114,7 +114,7 @@ __device__ inline void begin_with_last(const LaunchParams<T>& params, const Near
   double lack = 0;
   if (task.thickness.of_vertex)
     lack = task.meshes[of - world * task.n_pairs].thickest -
-           thickness_of(params, task.thickness, edges ? Kind::edge_edge : Kind::vertex_face, pair);
+           thickness_of(task.thickness, edges ? Kind::edge_edge : Kind::vertex_face, pair);
   s.distance = bits_of(n.distance + lack), s.key = key, s.without_thickness = n.distance;
   lower_limit(s, (n.distance + lack) * (1 + 1e-14) + s.rounding);
 }
@@ -129,19 +129,19 @@ __global__ void begin_nearest_kernel(const __grid_constant__ LaunchParams<T> par
   if (valid) {
     meshes = task.meshes[of - world * task.n_pairs];
     NearestSoFar& s = task.so_far[of];
-    const u64 key = s.key, crossing = s.crossing;
+    const u64 key = s.key, intersecting = s.intersecting;
     const SceneExtent extent(params.worlds[world]);
     const double scale = extent.map().scale;
     // For a pair as large as the scene, as in traverse/nearest_pairs.cpp.
     constexpr double test_rounding = distance_radius + 1e-14;
     s = {bits_of(1e307),           bits_of(INFINITY),          no_pair, no_pair, INFINITY, scale,
          2e-15 * extent.largest(), 14 * test_rounding / scale, 0};
-    if (meshes.root_a != no_node && meshes.root_b != no_node) begin_with_last(params, task, of, key, crossing);
+    if (meshes.root_a != no_node && meshes.root_b != no_node) begin_with_last(params, task, of, key, intersecting);
   }
   const bool searched = valid && meshes.root_a != no_node && meshes.root_b != no_node;
   keep_nodes(params, task, searched && may_improve(params, task, of, meshes.root_a, meshes.root_b), of, meshes.root_a,
              meshes.root_b, 0);
-  if (!searched || !meshes.same || task.so_far[of].key != no_pair || task.so_far[of].crossing != no_pair) return;
+  if (!searched || !meshes.same || task.so_far[of].key != no_pair || task.so_far[of].intersecting != no_pair) return;
   const u32 n = min(meshes.n_leaves, samples_of_mesh);
   const u64 at = atomicAdd(&task.counters->samples, u64{2} * n);
   for (u32 i = 0; i < n && at + 2 * i + 1 < task.sample_capacity; ++i) {
@@ -200,16 +200,16 @@ __global__ void nearest_results_kernel(const __grid_constant__ LaunchParams<T> p
     const u32 world = i / task.n_pairs;
     const SearchedMeshes meshes = task.meshes[i - world * task.n_pairs];
     NearestOfMeshes r;
-    r.found = s.crossing != no_pair || s.key != no_pair;
+    r.found = s.intersecting != no_pair || s.key != no_pair;
     r.distance = r.without_thickness = 0;
-    r.limit = limit_bits_to_double(s.limit);
-    if (s.crossing != no_pair) {
+    r.limit = double_of(s.limit);
+    if (s.intersecting != no_pair) {
       r.pair = features_of(params, world, Kind::edge_face,
-                           {static_cast<u32>(s.crossing >> 32), static_cast<u32>(s.crossing)});
+                           {static_cast<u32>(s.intersecting >> 32), static_cast<u32>(s.intersecting)});
     } else if (r.found) {
       r.pair = features_of(params, world, s.key >> 62 ? Kind::edge_edge : Kind::vertex_face,
                            {static_cast<u32>(s.key >> 31) & ~kind_bit, static_cast<u32>(s.key) & ~kind_bit});
-      r.distance = limit_bits_to_double(s.distance), r.without_thickness = s.without_thickness;
+      r.distance = double_of(s.distance), r.without_thickness = s.without_thickness;
     }
     r.boxes_meet = r.a_within_b = r.b_within_a = false;
     if (!meshes.same && meshes.root_a != no_node && meshes.root_b != no_node) {

@@ -23,7 +23,7 @@ struct SearchedMeshes {
 // What is in a subtree.
 struct NodeContent {
   static constexpr u32 faces = 1, edges = 2, isolated_vertices = 4;
-  u32 least_edge, kinds;
+  u32 least_edge, kinds;  // the lowest number of an edge; which kinds of features
 
   // Whether some features of two nodes are tested against each other.
   HPCCD_HD static bool tested(u32 a, u32 b) { return ((a | b) & faces) || (a & b & edges); }
@@ -34,10 +34,10 @@ inline constexpr u32 samples_of_mesh = 64;
 
 // The nearest pair so far of two meshes in one world.
 struct NearestSoFar {
-  u64 limit;     // bits: pairs beyond it, plus their lack, cannot improve the result
-  u64 distance;  // bits, with the lack
-  u64 key;       // kind, first, second: its order is that of NearestPair::before at equal distances
-  u64 crossing;  // edge << 32 | face: the first intersecting pair; then distances do not matter
+  u64 limit;         // bits: pairs beyond it, plus their lack, cannot improve the result
+  u64 distance;      // bits, with the lack
+  u64 key;           // kind, first, second: its order is that of NearestPair::before at equal distances
+  u64 intersecting;  // edge << 32 | face: the first intersecting pair; then distances do not matter
   double without_thickness;
   double scale, sums, rounding;  // of the world's coordinates
   u32 lock;
@@ -75,11 +75,11 @@ struct InsideTask {
   std::int32_t* numbers;
 };
 
-__device__ inline double limit_bits_to_double(u64 bits) { return __longlong_as_double(static_cast<long long>(bits)); }
+__device__ inline double double_of(u64 bits) { return __longlong_as_double(static_cast<long long>(bits)); }
 
 // Read as other multiprocessors have written it.
 __device__ inline u64 fresh(const u64* at) { return *reinterpret_cast<const volatile u64*>(at); }
-__device__ inline double limit_of(const NearestSoFar& s) { return limit_bits_to_double(fresh(&s.limit)); }
+__device__ inline double limit_of(const NearestSoFar& s) { return double_of(fresh(&s.limit)); }
 
 // Features farther apart than this along an axis, in coordinates of the boxes, cannot improve the result.
 __device__ inline float reach_of(const NearestSoFar& s, double limit) {

@@ -7,9 +7,8 @@
 
 namespace hpccd::gpu {
 
-template <class T>
-__device__ inline double thickness_of(const LaunchParams<T>& params, const Thicknesses& t, Kind kind, uint2 pair) {
-  if (!t.of_vertex) return 0;
+// Of both features. A search whose boxes have not grown by the thickness has it apart from the frame's.
+__device__ inline double thickness_of(const Thicknesses& t, Kind kind, uint2 pair) {
   return kind == Kind::edge_edge ? t.of_edge[pair.x] + t.of_edge[pair.y] : t.of_vertex[pair.x] + t.of_face[pair.y];
 }
 
@@ -62,7 +61,7 @@ __device__ __forceinline__ Nearness nearness(const LaunchParams<T>& params, u32 
 
 // Whether an edge meets a face; intersection_kernel for one pair.
 template <class T>
-__device__ __forceinline__ Outcome crossing_of(const LaunchParams<T>& params, u32 world, uint2 pair) {
+__device__ __forceinline__ Outcome intersection_of(const LaunchParams<T>& params, u32 world, uint2 pair) {
   Vec3<double> q[5];
   positions_of(params, world, Kind::edge_face, pair, q);
   const EdgeFace<double> spans = edge_face(q);
@@ -104,15 +103,15 @@ __device__ __noinline__ void test_nearest(const LaunchParams<T>& params, const N
     const NearestSoFar& s = task.so_far[of];
     const u32 world = of / task.n_pairs;
     if (task.thickness.of_vertex)
-      lack = task.meshes[of - world * task.n_pairs].thickest - thickness_of(params, task.thickness, kind, pair);
+      lack = task.meshes[of - world * task.n_pairs].thickest - thickness_of(task.thickness, kind, pair);
     const double limit = limit_of(s) - lack;
-    if (limit >= 0 && fresh(&s.crossing) == no_pair) {
+    if (limit >= 0 && fresh(&s.intersecting) == no_pair) {
       const Nearness n = nearness<kind>(params, world, pair, limit);
       near = n.outcome == Outcome::yes, undecided = n.outcome == Outcome::undecided;
       distance = n.distance;
     }
   }
-  // Twice at one place: the first pair in order is the result (NearestPair::before).
+  // Of pairs at the same distance, the first in order is the result (NearestPair::before).
   const double whole = distance + lack;
   const bool wanted = near && bits_of(whole) <= fresh(&task.so_far[of].distance);
   offer(task, wanted, of, whole, key_of_nearest(kind, pair.x, pair.y), distance);
@@ -120,12 +119,12 @@ __device__ __noinline__ void test_nearest(const LaunchParams<T>& params, const N
 }
 
 template <class T>
-__device__ __noinline__ void test_crossing(const LaunchParams<T>& params, const NearestTask& task, bool valid,
-                                           uint2 pair, u32 of) {
+__device__ __noinline__ void test_intersection(const LaunchParams<T>& params, const NearestTask& task, bool valid,
+                                               uint2 pair, u32 of) {
   Outcome outcome = Outcome::no;
   const u64 key = static_cast<u64>(pair.x) << 32 | pair.y;
-  if (valid && key < fresh(&task.so_far[of].crossing)) outcome = crossing_of(params, of / task.n_pairs, pair);
-  if (outcome == Outcome::yes) atomicMin(&task.so_far[of].crossing, key);
+  if (valid && key < fresh(&task.so_far[of].intersecting)) outcome = intersection_of(params, of / task.n_pairs, pair);
+  if (outcome == Outcome::yes) atomicMin(&task.so_far[of].intersecting, key);
   append_undecided(task, outcome == Outcome::undecided, of, Kind::edge_face, pair);
 }
 
