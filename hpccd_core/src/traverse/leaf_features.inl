@@ -288,16 +288,20 @@ struct Leaves {
     if constexpr (many) return {leaf.rows + corner / 16 * next_group, corner % 16};
     return {leaf.rows, corner};
   }
+  // Bounds by number at compile time: in a loop, finding their rows takes longer than comparing them.
+  template <std::uint32_t bound, class First, class... Boxes>
+  HPCCD_HD static float joined_bound(const First& first, const Boxes&... of) {
+    float x = first[bound];
+    ((x = side_of_bound(bound) == Side::low ? lesser(of[bound], x) : greater(of[bound], x)), ...);
+    return x;
+  }
+  template <std::uint32_t... bounds, class... Boxes>
+  HPCCD_HD static FeatureBox joined_bounds(std::integer_sequence<std::uint32_t, bounds...>, const Boxes&... of) {
+    return {{joined_bound<bounds>(of...)...}};
+  }
   template <class... Boxes>
   HPCCD_HD static FeatureBox joined(const Boxes&... of) {
-    FeatureBox box;
-    for (std::uint32_t i = 0; i < n_bounds; ++i) {
-      const bool is_low = side_of_bound(i) == Side::low;
-      float x = is_low ? INFINITY : -INFINITY;
-      ((x = is_low ? lesser(of[i], x) : greater(of[i], x)), ...);
-      box.at[i] = x;
-    }
-    return box;
+    return joined_bounds(std::make_integer_sequence<std::uint32_t, n_bounds>(), of...);
   }
 };
 
