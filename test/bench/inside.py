@@ -569,7 +569,7 @@ def ways_of_poses(scene, vertices, faces, poses, query, threads, peers) -> dict:
     ways = {}
     by_poses, by_positions = (getattr(hc.Detector(scene, threads=threads), query) for _ in range(2))
     positions = [hc.Detector(scene).positions_at([pose]) for pose in poses]
-    ways["hpccd"] = in_turns(poses, lambda pose: found_of(by_poses(poses=[pose])))
+    ways["hpccd"] = in_turns(poses, lambda pose: found_of(by_poses(poses=pose[None])))
     ways["hpccd, positions"] = in_turns(positions, lambda x: found_of(by_positions(x)))
     for peer in peers:
         meshes = [peer.mesh(vertices.astype(peer.dtype), faces) for _ in range(2)]
