@@ -50,10 +50,12 @@ void leaf_edge_faces(const Tree& tree, const LeafRange& a, const LeafRange& b, C
       }
     const typename B::Lanes lanes_b({}, leaf_b);
     const typename B::Outcodes near_b({}, leaf_b, lanes_b, bounds_of(node_a));
+    const unsigned edges_b = near_b.edges(leaf_b), faces_b = near_b.faces(leaf_b);
+    if (!(edges_a && faces_b) && !(edges_b && faces_a)) return;
     if (node_a.mesh == node_b.mesh)
       find_shared(leaf_a, near_a.corners(leaf_a), leaf_b, near_b.corners(leaf_b), a_with_b, b_with_a);
-    edges_against_faces<A, B>(leaf_a, leaf_b, lanes_a, b_with_a, errors, edges_a, near_b.faces(leaf_b), edge_face);
-    edges_against_faces<B, A>(leaf_b, leaf_a, lanes_b, a_with_b, errors, near_b.edges(leaf_b), faces_a, edge_face);
+    edges_against_faces<A, B>(leaf_a, leaf_b, lanes_a, b_with_a, errors, edges_a, faces_b, edge_face);
+    edges_against_faces<B, A>(leaf_b, leaf_a, lanes_b, a_with_b, errors, edges_b, faces_a, edge_face);
   });
 }
 
