@@ -3,20 +3,15 @@
 // four loads, four minima and maxima and two comparisons. On the published scenes it rejects 60 to 85 % of the pairs
 // whose boxes overlap. Part of batch.inl and distance_batch.inl.
 
+#include "elementary/kdop_lanes.inl"
 #include "elementary/pair_list.inl"
 
-struct KdopLanes {
-  Floats16 low, high;
-};
 static_assert(sizeof(VertexKdop) == 16 * sizeof(float) && n_kdop_directions == 8);
 HPCCD_HD KdopLanes kdop_at(const VertexKdop* kdops, std::uint32_t v) {
   const Floats16 row = load16(reinterpret_cast<const float*>(kdops + v));
   return {row, row};
 }
 HPCCD_HD KdopLanes both(const KdopLanes& a, const KdopLanes& b) { return {min(a.low, b.low), max(a.high, b.high)}; }
-HPCCD_HD bool are_apart(const KdopLanes& a, const KdopLanes& b) {
-  return any_in_both_halves(less(a.high, b.low), less(b.high, a.low));
-}
 
 // A pair by its position in the batch, with its vertices.
 struct PairAt {
@@ -45,17 +40,11 @@ struct ApartByMore {
 
 // Separated by more than a margin in each direction up to a time below 1.
 struct ApartUntil {
-  Floats16 margin, time;
+  UntilTime until;
   HPCCD_HD bool operator()(const KdopLanes& a, const KdopLanes& b, const PairAt&) const {
-    return any_in_both_halves(less(at(a.high) + margin, at(b.low)), less(at(b.high) + margin, at(a.low)));
-  }
-  HPCCD_HD Floats16 at(Floats16 x) const {
-    const Floats16 start = first_half_twice(x);
-    return start + time * (x - start);
+    return until.are_apart(a, b);
   }
 };
-// Values below eight, interpolated in floats, have errors of 1.5e-6 each.
-HPCCD_HD ApartUntil until(const Geometry& g) { return {load16(g.margin.in) + all16(4e-6f), all16(g.until)}; }
 
 // Lists the pairs that are not separated. `next`: the data of each vertex that the following test reads.
 template <Kind kind, class AreApart, class Row>
@@ -86,7 +75,7 @@ HPCCD_HD void list_pairs(const AreApart& apart, const Geometry& g, const Row* ne
   if (!g.kdops)
     list_all<kind>(g, first, second, n, list);
   else if (g.until < 1)
-    list_near<kind>(until(g), g, next, first, second, n, list);
+    list_near<kind>(ApartUntil{until(g.margin, g.until)}, g, next, first, second, n, list);
   else
     list_near<kind>(apart, g, next, first, second, n, list);
 }

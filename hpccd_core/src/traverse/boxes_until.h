@@ -10,7 +10,7 @@
 namespace hpccd {
 
 struct BoxesUntil {
-  using Ends = AtLeaves;
+  using Ends = AtBlocks;
   static constexpr bool shrink = true;
   const ContactSearch& search;
   // The best time when it was last read.
@@ -28,6 +28,10 @@ struct BoxesUntil {
     return part.reach >= 0 ? a.near_at_start(b, part.reach) : a.overlap_until(b, part.until);
   }
   bool within(const Node&) const { return true; }
+  std::uint32_t leaf_pairs(const Block& a, const Block& b, LeafPair* found) const {
+    if (part.until >= 1) return search.block_pairs(search.tree, a, b, found);
+    return search.block_pairs_until(search.tree, a, b, part.until, part.reach, search.geometry.margin, found);
+  }
   bool open(NodePair) const { return !search.over(); }
   void sort(std::vector<NodePair>&, std::size_t) const {}
 };
@@ -38,6 +42,12 @@ struct BoxesUntilLessExcess : BoxesUntil {
     const float excess = search.excess.of(a, b);
     if (part.until < 1 && part.reach >= 0) return a.near_at_start(b, part.reach - excess);
     return a.overlaps(b, excess) && (part.until >= 1 || a.overlap_until(b, part.until));
+  }
+  // Up to a time below 1 the few leaves that only the excess keeps near are left to the tests of their features.
+  std::uint32_t leaf_pairs(const Block& a, const Block& b, LeafPair* found) const {
+    const float excess = search.excess.of(search.tree.nodes[a.node], search.tree.nodes[b.node]);
+    if (excess > 0 && part.until >= 1) return search.block_pairs_less_excess(search.tree, a, b, excess, found);
+    return BoxesUntil::leaf_pairs(a, b, found);
   }
 };
 

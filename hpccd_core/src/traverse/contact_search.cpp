@@ -11,6 +11,15 @@ namespace {
 
 #include "traverse/walk.inl"
 
+// Down to blocks only, whose leaf boxes are compared in lanes.
+struct MotionBoxesOfBlocks : MotionBoxes {
+  using Ends = AtBlocks;
+  const ContactSearch& search;
+  std::uint32_t leaf_pairs(const Block& a, const Block& b, LeafPair* found) const {
+    return search.block_pairs(search.tree, a, b, found);
+  }
+};
+
 // Nodes that may hold an unlisted pair that touches.
 struct UnlistedBoxes {
   using Ends = AtLeaves;
@@ -65,7 +74,7 @@ void ContactSearch::traverse(ThreadPool& pool, std::vector<Worker>& workers) {
   else if (prunes)
     traverse_all(BoxesUntil{*this}, *this, pool, workers);
   else
-    traverse_all(MotionBoxesOfBlocks(), *this, pool, workers);
+    traverse_all(MotionBoxesOfBlocks{{}, *this}, *this, pool, workers);
 }
 
 void ContactSearch::traverse_unlisted(const Drift& drift, ThreadPool& pool, std::vector<Worker>& workers) {

@@ -41,6 +41,12 @@ using LeafPairsUntil = void (*)(const Tree& tree, const LeafRange& a, const Leaf
                                 float until, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
 
 LeafPairsUntil leaf_pairs_until(Simd simd);
+// reach: how far boxes at the start may be apart; negative: boxes up to that time count. margin: see until() in
+// elementary/kdop_lanes.inl.
+using BlockPairsUntil = std::uint32_t (*)(const Tree& tree, const Block& a, const Block& b, float until, float reach,
+                                          const KdopMargin& margin, LeafPair* pairs);
+
+BlockPairsUntil block_pairs_until(Simd simd);
 
 // The same for two meshes whose boxes have grown by more than their separation requires (traverse/excess.h).
 using BlockPairsLessExcess = std::uint32_t (*)(const Tree& tree, const Block& a, const Block& b, float excess,
@@ -56,6 +62,10 @@ using LeafPairsInSnapshot = void (*)(const Tree& tree, const LeafRange& a, const
                                      float reach, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
 
 LeafPairsInSnapshot leaf_pairs_in_snapshot(Simd simd);
+using BlockPairsInSnapshot = std::uint32_t (*)(const Tree& tree, const Block& a, const Block& b, float reach,
+                                               LeafPair* pairs);
+
+BlockPairsInSnapshot block_pairs_in_snapshot(Simd simd);
 // The same for the start of a motion.
 LeafPairsInSnapshot leaf_pairs_at_start(Simd simd);
 

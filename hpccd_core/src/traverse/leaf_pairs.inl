@@ -6,6 +6,7 @@
 namespace hpccd::HPCCD_ISA {
 namespace {
 
+#include "elementary/kdop_lanes.inl"
 #include "traverse/candidate_rows.inl"
 #include "traverse/sharing.inl"
 
@@ -96,26 +97,105 @@ HPCCD_HD void pairs_between(When when, const LeafFeatures& a, const LeafFeatures
 }
 
 // Boxes of sixteen leaves.
-struct BoxLanes {
-  Rows16<n_bounds> rows;
-  HPCCD_HD explicit BoxLanes(const float (&at)[n_bounds][Block::width]) : rows(load_rows(at)) {}
-  // Bit j: box j overlaps b (MotionBox::overlaps).
+using BoxLanes = Rows16<n_bounds>;
+
+// Which pairs of leaves of two blocks are near. box(bounds): the box that stands for that of the other leaf or block;
+// apart: which boxes in lanes are apart from it along an axis. Throughout the motion (Node::overlaps):
+struct LeavesInMotion {
   template <class Box>
-  HPCCD_HD unsigned overlapping(const Box& b) const {
-    Mask16 apart;
-    for (std::uint32_t axis = 0; axis < 3; ++axis) {
-      const Mask16 below = less(rows[high(0, axis)], all16(b[low(0, axis)]));
-      const Mask16 above = less(all16(b[high(0, axis)]), rows[low(0, axis)]);
-      apart = apart | (below & less(rows[high(1, axis)], all16(b[low(1, axis)])));
-      apart = apart | (above & less(all16(b[high(1, axis)]), rows[low(1, axis)]));
-    }
-    return ~apart.bits() & 0xFFFF;
+  HPCCD_HD const Box& box(const Box& b) const {
+    return b;
+  }
+  template <class Box>
+  HPCCD_HD Mask16 apart(const BoxLanes& lanes, const Box& b, std::uint32_t axis) const {
+    const Mask16 below = less(lanes[high(0, axis)], all16(b[low(0, axis)])) &
+                         less(lanes[high(1, axis)], all16(b[low(1, axis)]));
+    const Mask16 above = less(all16(b[high(0, axis)]), lanes[low(0, axis)]) &
+                         less(all16(b[high(1, axis)]), lanes[low(1, axis)]);
+    return below | above;
+  }
+  HPCCD_HD bool are_apart(const Kdop& a, const Kdop& b) const { return HPCCD_ISA::are_apart(lanes_of(a), lanes_of(b)); }
+  HPCCD_HD static KdopLanes lanes_of(const Kdop& k) { return {load16(k.low), load16(k.high)}; }
+};
+
+// The box of a leaf or block, with each side moved outwards.
+template <class Box, class By>
+HPCCD_HD FeatureBox moved(const Box& b, By&& by) {
+  FeatureBox box;
+  for (std::uint32_t i = 0; i < n_bounds; ++i) box.at[i] = side_of_bound(i) == Side::low ? b[i] - by(i) : b[i] + by(i);
+  return box;
+}
+
+// The same for two meshes with an excess.
+struct LeavesLessExcess : LeavesInMotion {
+  float excess;
+  template <class Box>
+  HPCCD_HD FeatureBox box(const Box& b) const {
+    return moved(b, [&](std::uint32_t) { return -excess; });
   }
 };
 
-// Separated along a direction of their k-DOPs.
-HPCCD_HD bool are_apart(const Kdop& a, const Kdop& b) {
-  return any_in_both_halves(less(load16(a.high), load16(b.low)), less(load16(b.high), load16(a.low)));
+// Up to a time below 1 (Node::overlap_until).
+struct LeavesUntil {
+  float time;
+  UntilTime kdops;
+  template <class Box>
+  HPCCD_HD const Box& box(const Box& b) const {
+    return b;
+  }
+  template <class Box>
+  HPCCD_HD Mask16 apart(const BoxLanes& lanes, const Box& b, std::uint32_t axis) const {
+    return open(all16(b[low(0, axis)]) - lanes[high(0, axis)], all16(b[low(1, axis)]) - lanes[high(1, axis)]) |
+           open(lanes[low(0, axis)] - all16(b[high(0, axis)]), lanes[low(1, axis)] - all16(b[high(1, axis)]));
+  }
+  // Whether a gap stays open, from its widths at both ends of the motion.
+  HPCCD_HD Mask16 open(const Floats16& at_t0, const Floats16& at_t1) const {
+    return less(all16(0), at_t0) & less(all16(between_ends), at_t0 + all16(time) * (at_t1 - at_t0));
+  }
+  HPCCD_HD bool are_apart(const Kdop& a, const Kdop& b) const {
+    return kdops.are_apart(LeavesInMotion::lanes_of(a), LeavesInMotion::lanes_of(b));
+  }
+};
+
+// The same by boxes at the start (Node::near_at_start).
+struct LeavesAtStart : LeavesUntil {
+  float reach;
+  template <class Box>
+  HPCCD_HD FeatureBox box(const Box& b) const {
+    return moved(b, [&](std::uint32_t) { return reach; });
+  }
+  template <class Box>
+  HPCCD_HD Mask16 apart(const BoxLanes& lanes, const Box& b, std::uint32_t axis) const {
+    return less(lanes[high(0, axis)], all16(b[low(0, axis)])) | less(all16(b[high(0, axis)]), lanes[low(0, axis)]);
+  }
+};
+
+// In one snapshot (Node::near_in_snapshot), where there are no k-DOPs.
+struct LeavesInSnapshot {
+  float reach;
+  template <class Box>
+  HPCCD_HD FeatureBox box(const Box& b) const {
+    const float slanted = slanted_reach(reach);
+    return moved(b, [&](std::uint32_t i) { return i < n_bounds / 2 ? reach : slanted; });
+  }
+  template <class Box>
+  HPCCD_HD Mask16 apart(const BoxLanes& lanes, const Box& b, std::uint32_t axis) const {
+    Mask16 apart;
+    for (std::uint32_t end = 0; end < 2; ++end)
+      apart = apart | less(lanes[high(end, axis)], all16(b[low(end, axis)])) |
+              less(all16(b[high(end, axis)]), lanes[low(end, axis)]);
+    return apart;
+  }
+  HPCCD_HD bool are_apart(const Kdop&, const Kdop&) const { return false; }
+};
+
+// Bit j: box j of sixteen is near this one.
+template <class Which, class Box>
+HPCCD_HD unsigned near_boxes(const Which& which, const BoxLanes& lanes, const Box& bounds) {
+  const auto& b = which.box(bounds);
+  Mask16 apart;
+  for (std::uint32_t axis = 0; axis < 3; ++axis) apart = apart | which.apart(lanes, b, axis);
+  return ~apart.bits() & 0xFFFF;
 }
 
 template <class When>
@@ -134,28 +214,28 @@ HPCCD_HD void pairs_of_leaves(When when, const Tree& tree, const LeafRange& a, c
   });
 }
 
-// less(bounds): a box that replaces the leaf's own.
-template <class Less>
-HPCCD_HD std::uint32_t pairs_of_blocks(Less&& less, const Tree& tree, const Block& a, const Block& b, LeafPair* pairs) {
+template <class Which>
+HPCCD_HD std::uint32_t pairs_of_blocks(const Which& which, const Tree& tree, const Block& a, const Block& b,
+                                       LeafPair* pairs) {
   const Node* nodes = tree.nodes.data();
   const Kdop* kdops = tree.by_kdops ? tree.kdops.data() : nullptr;
   const bool same = &a == &b;
-  const BoxLanes boxes_b(b.rows);
+  const BoxLanes boxes_b = load_rows(b.rows);
   unsigned near_a = first_bits(a.n_leaves), near_b = first_bits(b.n_leaves);
   if (!same) {
-    near_a &= BoxLanes(a.rows).overlapping(less(bounds_of(nodes[b.node])));
-    near_b &= boxes_b.overlapping(less(bounds_of(nodes[a.node])));
+    near_a &= near_boxes(which, load_rows(a.rows), bounds_of(nodes[b.node]));
+    near_b &= near_boxes(which, boxes_b, bounds_of(nodes[a.node]));
   }
   std::uint32_t n = 0;
   for (unsigned left = near_a; left; left &= left - 1) {
     const auto i = static_cast<std::uint32_t>(__builtin_ctz(left));
     const std::uint32_t number = a.first_leaf + i;
-    unsigned m = boxes_b.overlapping(less(Bounds<Block::width>{a.rows[0] + i})) & near_b;
+    unsigned m = near_boxes(which, boxes_b, Bounds<Block::width>{a.rows[0] + i}) & near_b;
     if (same) m &= ~0u << i;
     for (; m; m &= m - 1) {
       const std::uint32_t other = b.first_leaf + static_cast<std::uint32_t>(__builtin_ctz(m));
       pairs[n] = {number, other};  // kept only if counted
-      n += !kdops || number == other || !are_apart(kdops[number], kdops[other]);
+      n += !kdops || number == other || !which.are_apart(kdops[number], kdops[other]);
     }
   }
   return n;
@@ -164,17 +244,22 @@ HPCCD_HD std::uint32_t pairs_of_blocks(Less&& less, const Tree& tree, const Bloc
 }  // namespace
 
 std::uint32_t block_pairs(const Tree& tree, const Block& a, const Block& b, LeafPair* pairs) {
-  return pairs_of_blocks([](const auto& bounds) { return bounds; }, tree, a, b, pairs);
+  return pairs_of_blocks(LeavesInMotion(), tree, a, b, pairs);
 }
 
 std::uint32_t block_pairs_less_excess(const Tree& tree, const Block& a, const Block& b, float excess, LeafPair* pairs) {
-  const auto less = [&](const auto& bounds) {
-    FeatureBox box;
-    for (std::uint32_t i = 0; i < n_bounds; ++i)
-      box.at[i] = side_of_bound(i) == Side::low ? bounds[i] + excess : bounds[i] - excess;
-    return box;
-  };
-  return pairs_of_blocks(less, tree, a, b, pairs);
+  return pairs_of_blocks(LeavesLessExcess{{}, excess}, tree, a, b, pairs);
+}
+
+std::uint32_t block_pairs_until(const Tree& tree, const Block& a, const Block& b, float time, float reach,
+                                const KdopMargin& margin, LeafPair* pairs) {
+  const LeavesUntil which{time, until(margin, time)};
+  return reach < 0 ? pairs_of_blocks(which, tree, a, b, pairs)
+                   : pairs_of_blocks(LeavesAtStart{which, reach}, tree, a, b, pairs);
+}
+
+std::uint32_t block_pairs_in_snapshot(const Tree& tree, const Block& a, const Block& b, float reach, LeafPair* pairs) {
+  return pairs_of_blocks(LeavesInSnapshot{reach}, tree, a, b, pairs);
 }
 
 void leaf_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested,

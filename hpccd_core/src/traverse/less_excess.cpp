@@ -12,6 +12,16 @@ namespace {
 
 #include "traverse/walk.inl"
 
+struct MotionBoxesOfBlocks : MotionBoxesLessExcess {
+  using Ends = AtBlocks;
+  const ContactSearch& search;
+  std::uint32_t leaf_pairs(const Block& a, const Block& b, LeafPair* found) const {
+    const float by = excess.of(search.tree.nodes[a.node], search.tree.nodes[b.node]);
+    return by > 0 ? search.block_pairs_less_excess(search.tree, a, b, by, found)
+                  : search.block_pairs(search.tree, a, b, found);
+  }
+};
+
 }  // namespace
 
 void ContactSearch::traverse_less_excess(ThreadPool& pool, std::vector<Worker>& workers) {
@@ -20,7 +30,7 @@ void ContactSearch::traverse_less_excess(ThreadPool& pool, std::vector<Worker>& 
   else if (prunes)
     traverse_all(BoxesUntilLessExcess{{*this}}, *this, pool, workers);
   else
-    traverse_all(MotionBoxesOfBlocksLessExcess{{excess}}, *this, pool, workers);
+    traverse_all(MotionBoxesOfBlocks{{excess}, *this}, *this, pool, workers);
 }
 
 }  // namespace hpccd

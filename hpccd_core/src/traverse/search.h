@@ -108,6 +108,7 @@ struct ContactSearch final : Search {
   const BlockPairsLessExcess block_pairs_less_excess = hpccd::block_pairs_less_excess(simd);
   const LeafPairsLessExcess leaf_pairs_less_excess = hpccd::leaf_pairs_less_excess(simd);
   // For a part of the motion when searching for the earliest contacts; also by boxes at the start only.
+  const BlockPairsUntil block_pairs_until = hpccd::block_pairs_until(simd);
   const LeafPairsUntil leaf_pairs_until = hpccd::leaf_pairs_until(simd);
   const LeafPairsInSnapshot leaf_pairs_at_start = hpccd::leaf_pairs_at_start(simd);
   // In coordinates of the boxes: twice the longest displacement of a vertex along an axis, and how much boxes at the
@@ -135,8 +136,9 @@ struct ContactSearch final : Search {
 struct SnapshotSearch : Search {
   SnapshotSearch(const Tree& tree, const PairRules& rules, Simd simd);
   float reach = 0;
-  PlacedMeshes* placed =
-      nullptr;  // the meshes of the tree if they are at poses: leaves are fitted where they are tested
+  const BlockPairsInSnapshot block_pairs = block_pairs_in_snapshot(simd);
+  // The meshes of the tree if they are at poses: leaves are fitted where they are tested.
+  PlacedMeshes* placed = nullptr;
   void fit(LeafPair pair) const {
     if (placed) placed->fit(pair.first), placed->fit(pair.second);
   }

@@ -24,16 +24,6 @@ struct AtPoses {
   Node operator()(const Node& node) const { return meshes.at_pose(node); }
 };
 
-template <class At>
-struct SnapshotBoxes {
-  using Ends = AtLeaves;
-  static constexpr bool shrink = false;
-  float reach;
-  At at;
-  bool overlap(const Node& a, const Node& b) const { return at(a).near_in_snapshot(at(b), reach); }
-  bool within(const Node&) const { return true; }
-};
-
 // Nodes that may contain a pair that improves the result. Boxes are compared by Euclidean distance: along each axis
 // alone, most of a mesh that is far away along a diagonal is within the smallest distance. Two meshes start with an
 // upper bound (NearestPairs::begin), so that far pairs are not visited before near ones. For a cloth of 6 K triangles

@@ -13,6 +13,19 @@ namespace {
 
 #include "traverse/walk.inl"
 
+// Down to blocks, whose leaf boxes are compared in lanes.
+struct SnapshotBoxes {
+  using Ends = AtBlocks;
+  static constexpr bool shrink = false;
+  float reach;
+  const SnapshotSearch& search;
+  bool overlap(const Node& a, const Node& b) const { return a.near_in_snapshot(b, reach); }
+  bool within(const Node&) const { return true; }
+  std::uint32_t leaf_pairs(const Block& a, const Block& b, LeafPair* found) const {
+    return search.block_pairs(search.tree, a, b, reach, found);
+  }
+};
+
 // The meshes of a pair, by one vertex of each feature.
 std::pair<std::uint32_t, std::uint32_t> meshes_of(const NearestPairs& nearest, const Geometry& g, Kind kind,
                                                   std::uint32_t first, std::uint32_t second) {
@@ -37,7 +50,7 @@ SnapshotSearch::SnapshotSearch(const Tree& tree, const PairRules& rules, Simd si
 
 void SnapshotSearch::traverse(ThreadPool& pool, std::vector<Worker>& workers) {
   if (placed) return traverse_placed(*this, pool, workers);
-  traverse_all(SnapshotBoxes<AsFitted>{reach, {}}, *this, pool, workers);
+  traverse_all(SnapshotBoxes{reach, *this}, *this, pool, workers);
 }
 
 bool ProximitySearch::take(Kind kind, const Contact& pair, std::vector<Contact>& list) {

@@ -68,14 +68,6 @@ struct MotionBoxesLessExcess {
   bool within(const Node&) const { return true; }
 };
 
-// The same down to blocks only, whose leaf boxes are compared in lanes.
-struct MotionBoxesOfBlocks : MotionBoxes {
-  using Ends = AtBlocks;
-};
-struct MotionBoxesOfBlocksLessExcess : MotionBoxesLessExcess {
-  using Ends = AtBlocks;
-};
-
 // Whether features of two nodes, or of one, may have to be tested. Separate functions: the registers for the path
 // through the rules would make every visit of the cases before it a third slower.
 template <class Boxes>

@@ -39,10 +39,7 @@ void walk(Boxes boxes, const Query& search, std::vector<NodePair>& stack, Worker
     if (is_end(tree.nodes, p, ends)) {
       if constexpr (std::is_same_v<typename Boxes::Ends, AtBlocks>) {
         LeafPair found[block_pairs_capacity];
-        const Block &a = block_of(tree, p.a), &b = block_of(tree, p.b);
-        const float excess = search.excess.of(tree.nodes[p.a], tree.nodes[p.b]);
-        const std::uint32_t n = excess > 0 ? search.block_pairs_less_excess(tree, a, b, excess, found)
-                                           : search.block_pairs(tree, a, b, found);
+        const std::uint32_t n = boxes.leaf_pairs(block_of(tree, p.a), block_of(tree, p.b), found);
         for (std::uint32_t i = 0; i < n; ++i) at_leaves(found[i]);
       } else {
         at_leaves({tree.nodes[p.a].leaf, tree.nodes[p.b].leaf});
