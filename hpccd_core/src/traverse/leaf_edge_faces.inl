@@ -9,23 +9,25 @@ namespace {
 #include "traverse/candidate_rows.inl"
 #include "traverse/face_planes.inl"
 
-// Pairs these edges of a with these faces of b. The loop is over the faces, of which a leaf has fewer. Their planes
-// come before their boxes: they reject more and take less time.
+// Pairs these faces of a, one by one, with these edges of b. Planes come before boxes: they reject more and take less
+// time.
 template <class A, class B>
-[[gnu::noinline]] void edges_against_faces(const LeafFeatures& a, const LeafFeatures& b,
-                                           const typename A::Lanes& lanes_a, const Sharing& shared, PlaneErrors errors,
-                                           unsigned edges_a, unsigned faces_b, CandidateBuffer& out) {
-  if (!edges_a || !faces_b) return;
-  const FeatureBoxes<B, 3> boxes(b);
-  CandidateRows rows;
-  for_each(faces_b, [&](std::uint32_t k) {
-    const auto& corner = b.corners_of->face;
-    unsigned m = edges_a & ~(shared.edges[corner[0][k]] | shared.edges[corner[1][k]] | shared.edges[corner[2][k]]);
-    if (errors.known) m &= PlaneSides<A>(FacePlane::of<B>(b, k, errors), a).edges(a);
-    if (m) m &= typename A::Outcodes({}, a, lanes_a, boxes[k]).edges(a);
-    rows.add(b.faces[k], m);
+[[gnu::noinline]] void face_edge_pairs(const LeafFeatures& a, const LeafFeatures& b, const typename B::Lanes& lanes_b,
+                                       const PlaneErrors& errors, LeafPairOf leaves, unsigned faces_a, unsigned edges_b,
+                                       CandidateBuffer& out) {
+  if (!faces_a || !edges_b) return;
+  CornersAgainst<A, B, TouchingInSnapshot> corners(a, b, corners_of(a, 0, faces_a), leaves);
+  unsigned edges_of[CornersOf::most_faces], left = 0;
+  for_each(faces_a, [&](std::uint32_t k) {
+    unsigned m = edges_b & ~corners.edges_sharing_face(k);
+    if (errors.known) m &= PlaneSides<B>(FacePlane::of<A>(a, k, errors), b).edges(b);
+    edges_of[k] = m, left |= (m != 0 ? 1u : 0u) << k;
   });
-  rows.append_to(out.second, out.first, out.n, a.edges, a.n_edges);
+  if (!left) return;
+  corners.compare({}, a, b, lanes_b, corners_of(a, 0, left));
+  CandidateRows rows;
+  for_each(left, [&](std::uint32_t k) { rows.add(a.faces[k], edges_of[k] & corners.edges_near_face(b, k)); });
+  rows.append_to(out.second, out.first, out.n, b.edges, b.n_edges);
 }
 
 }  // namespace
@@ -40,22 +42,18 @@ void leaf_edge_faces(const Tree& tree, const LeafRange& a, const LeafRange& b, C
     using A = decltype(of_a);
     using B = decltype(of_b);
     const typename A::Lanes lanes_a({}, leaf_a);
-    const typename A::Outcodes near_a({}, leaf_a, lanes_a, bounds_of(node_b));
-    const unsigned edges_a = near_a.edges(leaf_a), faces_a = near_a.faces(leaf_a);
-    Sharing a_with_b, b_with_a;
     if constexpr (std::is_same_v<A, B>)  // otherwise the leaves differ
-      if (&a == &b) {
-        find_own(leaf_a, a_with_b);
-        return edges_against_faces<A, A>(leaf_a, leaf_a, lanes_a, a_with_b, errors, edges_a, faces_a, edge_face);
-      }
+      if (&a == &b)
+        return face_edge_pairs<A, A>(leaf_a, leaf_a, lanes_a, errors, LeafPairOf::same, first_bits(leaf_a.n_faces),
+                                     first_bits(leaf_a.n_edges), edge_face);
     const typename B::Lanes lanes_b({}, leaf_b);
+    const typename A::Outcodes near_a({}, leaf_a, lanes_a, bounds_of(node_b));
     const typename B::Outcodes near_b({}, leaf_b, lanes_b, bounds_of(node_a));
-    const unsigned edges_b = near_b.edges(leaf_b), faces_b = near_b.faces(leaf_b);
-    if (!(edges_a && faces_b) && !(edges_b && faces_a)) return;
-    if (node_a.mesh == node_b.mesh)
-      find_shared(leaf_a, near_a.corners(leaf_a), leaf_b, near_b.corners(leaf_b), a_with_b, b_with_a);
-    edges_against_faces<A, B>(leaf_a, leaf_b, lanes_a, b_with_a, errors, edges_a, faces_b, edge_face);
-    edges_against_faces<B, A>(leaf_b, leaf_a, lanes_b, a_with_b, errors, edges_b, faces_a, edge_face);
+    const LeafPairOf leaves = node_a.mesh == node_b.mesh ? LeafPairOf::neighbours : LeafPairOf::strangers;
+    face_edge_pairs<A, B>(leaf_a, leaf_b, lanes_b, errors, leaves, near_a.faces(leaf_a), near_b.edges(leaf_b),
+                          edge_face);
+    face_edge_pairs<B, A>(leaf_b, leaf_a, lanes_a, errors, leaves, near_b.faces(leaf_b), near_a.edges(leaf_a),
+                          edge_face);
   });
 }
 

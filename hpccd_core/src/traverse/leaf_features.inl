@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the features of a leaf that lie beyond one side of a box. Outcodes (Cohen and Sutherland) tell which corners
+// Finds the features of a leaf that lie beyond one side of a box. Outcodes (Cohen and Sutherland) say which corners
 // lie beyond which side; a feature is outside if all its corners lie beyond the same side. Sixteen corners are
-// compared at a time, and boxes of the features are never built. Part of leaf_pairs.inl and leaf_edge_faces.inl.
+// compared at a time. Boxes of features are never built: a corner lies beyond a side of the box of a feature if it lies
+// beyond that side of each of the feature's corners. Part of leaf_pairs.inl and leaf_edge_faces.inl.
 
 HPCCD_HD constexpr std::uint32_t low(std::uint32_t end, std::uint32_t axis) {
   return bound_number(end, Side::low, axis);
@@ -263,12 +264,19 @@ struct Leaves {
   };
 
   struct Outcodes : Sides<When::sets> {
+    HPCCD_HD Outcodes() {}
     template <class Box>
     HPCCD_HD Outcodes(When when, const LeafFeatures& leaf, const Lanes& lanes, const Box& box) {
       const auto& b = when.bounds(box);
       this->find(leaf, [&](std::uint32_t group, std::uint32_t lane, RowMask(&beyond)[6 * When::sets]) {
         When::sides(lanes.at(group, lane), b, beyond);
       });
+    }
+    HPCCD_HD Outcodes operator&(const Outcodes& other) const {
+      Outcodes both;
+      for (std::uint32_t s = 0; s < When::sets; ++s)
+        for (std::uint32_t g = 0; g < groups; ++g) both.of[s][g] = this->of[s][g] & other.of[s][g];
+      return both;
     }
   };
 
@@ -283,79 +291,15 @@ struct Leaves {
   struct CornerBox {
     const CornerRow* rows;
     std::uint32_t lane;
-    HPCCD_HD const float& row_of(std::uint32_t bound) const {
+    HPCCD_HD float operator[](std::uint32_t bound) const {
       const std::uint32_t row = bound / 6 * 3 + bound % 3;
       return rows[side_of_bound(bound) == Side::low ? row : row + high_rows].lane[lane];
     }
-    HPCCD_HD float operator[](std::uint32_t bound) const { return row_of(bound); }
   };
-  HPCCD_HD static Row picked_of(const float* row, Picks16 p) {
-    if constexpr (many)
-      return picked(row, row + next_group * CornerRow::width, p);
-    else
-      return picked(row, p);
-  }
   HPCCD_HD static CornerBox box_of(const LeafFeatures& leaf, std::uint32_t corner) {
     if constexpr (many) return {leaf.rows + corner / 16 * next_group, corner % 16};
     return {leaf.rows, corner};
   }
-  // Bounds by number at compile time: in a loop, finding their rows takes longer than comparing them.
-  template <std::uint32_t bound, class First, class... Boxes>
-  HPCCD_HD static float joined_bound(const First& first, const Boxes&... of) {
-    float x = first[bound];
-    ((x = side_of_bound(bound) == Side::low ? lesser(of[bound], x) : greater(of[bound], x)), ...);
-    return x;
-  }
-  template <std::uint32_t... bounds, class... Boxes>
-  HPCCD_HD static FeatureBox joined_bounds(std::integer_sequence<std::uint32_t, bounds...>, const Boxes&... of) {
-    return {{joined_bound<bounds>(of...)...}};
-  }
-  template <class... Boxes>
-  HPCCD_HD static FeatureBox joined(const Boxes&... of) {
-    return joined_bounds(std::make_integer_sequence<std::uint32_t, n_bounds>(), of...);
-  }
-};
-
-// The boxes of a leaf's edges or faces with n corners each: all of them at once where the kernel can permute lanes,
-// otherwise one by one.
-template <class Kernel, std::uint32_t n>
-class FeatureBoxes {
-  static constexpr std::uint32_t most = n == 2 ? CornersOf::most_edges : CornersOf::most_faces;
-
- public:
-  HPCCD_HD explicit FeatureBoxes(const LeafFeatures& leaf)
-      : leaf_(leaf), corner_(n == 2 ? leaf.corners_of->edge[0] : leaf.corners_of->face[0]) {
-    if constexpr (picks_at_once)
-      for (std::uint32_t i = 0; i < (n == 2 ? leaf.n_edges : leaf.n_faces); i += 16) join(i);
-  }
-  HPCCD_HD auto operator[](std::uint32_t k) const {
-    if constexpr (picks_at_once)
-      return Bounds<most>{bounds_[0] + k};
-    else if constexpr (n == 2)
-      return Kernel::joined(box(0, k), box(1, k));
-    else
-      return Kernel::joined(box(0, k), box(1, k), box(2, k));
-  }
-
- private:
-  HPCCD_HD auto box(std::uint32_t j, std::uint32_t k) const { return Kernel::box_of(leaf_, corner_[j * most + k]); }
-  HPCCD_HD void join(std::uint32_t i) {
-    Picks16 of[n];
-    for (std::uint32_t j = 0; j < n; ++j) of[j] = picks(corner_ + j * most + i);
-    for (std::uint32_t bound = 0; bound < n_bounds; ++bound) {
-      const float* row = &Kernel::box_of(leaf_, 0).row_of(bound);
-      Row x = Kernel::picked_of(row, of[0]);
-      for (std::uint32_t j = 1; j < n; ++j) {
-        const Row y = Kernel::picked_of(row, of[j]);
-        x = side_of_bound(bound) == Side::low ? min(x, y) : max(x, y);
-      }
-      store(bounds_[bound] + i, x);
-    }
-  }
-
-  const LeafFeatures& leaf_;
-  const std::uint8_t* corner_;  // row by row, `most` numbers per row
-  alignas(64) float bounds_[picks_at_once ? n_bounds : 1][most];
 };
 
 // Calls f with the type that describes how the leaves are read.

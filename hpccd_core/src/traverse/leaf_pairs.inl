@@ -20,80 +20,86 @@ HPCCD_HD void put_in_order(CandidateBuffer& out, std::uint32_t begin) {
     }
 }
 
-// Pairs these edges of a, one by one, with these edges of b. Not inlined, like the next function: copies of both in
-// each caller increased compile time by half and made no scene faster.
-template <class A, class B, class When>
-[[gnu::noinline]] void edge_pairs(When when, const LeafFeatures& a, const LeafFeatures& b,
-                                  const typename B::Lanes& lanes_b, const Sharing& shared, unsigned edges_a,
-                                  unsigned edges_b, CandidateBuffer& out) {
+template <class Against>
+HPCCD_HD void edge_pairs(const Against& corners, const LeafFeatures& a, const LeafFeatures& b, unsigned edges_a,
+                         unsigned edges_b, CandidateBuffer& out) {
   const bool same = a.rows == b.rows;
-  const FeatureBoxes<A, 2> boxes(a);
-  const auto& end = a.corners_of->edge;
   CandidateRows rows;
   for_each(edges_a, [&](std::uint32_t k) {
-    unsigned m = edges_b & ~(shared.edges[end[0][k]] | shared.edges[end[1][k]]);
-    if (same) m &= ~first_bits(k + 1);
-    rows.add(a.edges[k], typename B::Outcodes(when, b, lanes_b, boxes[k]).edges(b) & m);
+    rows.add(a.edges[k], corners.edges_near_edge(b, k) & (same ? edges_b & ~first_bits(k + 1) : edges_b));
   });
   const std::uint32_t begin = out.n;
   rows.append_to(out.first, out.second, out.n, b.edges, b.n_edges);
   put_in_order(out, begin);
 }
 
-// Pairs these vertices of a, one by one, with these faces of b. `shared` may be null.
-template <class A, class B, class When>
-[[gnu::noinline]] void vertex_face_pairs(When when, const LeafFeatures& a, const LeafFeatures& b,
-                                         const typename B::Lanes& lanes_b, const Sharing* shared, unsigned vertices_a,
-                                         unsigned faces_b, CandidateBuffer& out) {
+template <class Against>
+HPCCD_HD void vertex_face_pairs(const Against& corners, const LeafFeatures& a, const LeafFeatures& b,
+                                unsigned vertices_a, unsigned faces_b, CandidateBuffer& out) {
   CandidateRows rows;
-  for_each(vertices_a, [&](std::uint32_t k) {
-    const std::uint32_t vertex = a.corners[k];
-    const unsigned others =
-        faces_b & ~(shared ? shared->faces[k] : FeaturesAt(b, first_bits(b.n_corners), vertex).faces);
-    rows.add(vertex, others & typename B::Outcodes(when, b, lanes_b, A::box_of(a, k)).faces(b));
-  });
+  for_each(vertices_a, [&](std::uint32_t i) { rows.add(a.corners[i], corners.faces_near_vertex(b, i) & faces_b); });
   rows.append_to(out.first, out.second, out.n, b.faces, b.n_faces);
+}
+
+template <class Against>
+HPCCD_HD void face_vertex_pairs(const Against& corners, const LeafFeatures& a, const LeafFeatures& b, unsigned faces_a,
+                                unsigned vertices_b, CandidateBuffer& out) {
+  CandidateRows rows;
+  for_each(faces_a, [&](std::uint32_t k) { rows.add(a.faces[k], corners.vertices_near_face(b, k) & vertices_b); });
+  rows.append_to(out.second, out.first, out.n, b.corners, b.n_vertices);
 }
 
 template <class Kernel, class When>
 HPCCD_HD void pairs_within(When when, const LeafFeatures& leaf, TestedFeatures tested, CandidateBuffer& edge_edge,
                            CandidateBuffer& vertex_face) {
-  const typename Kernel::Lanes lanes(when, leaf);
-  Sharing own;
-  find_own(leaf, own);
+  using Against = CornersAgainst<Kernel, Kernel, When>;
+  const Against corners(when, leaf, leaf, typename Kernel::Lanes(when, leaf), first_bits(leaf.n_corners),
+                        Against::Leaves::same);
   const unsigned edges = first_bits(leaf.n_edges), vertices = first_bits(leaf.n_vertices);
-  if (tested.edge_edge) edge_pairs<Kernel, Kernel>(when, leaf, leaf, lanes, own, edges, edges, edge_edge);
-  if (!tested.vertex_face) return;
-  vertex_face_pairs<Kernel, Kernel>(when, leaf, leaf, lanes, &own, vertices, first_bits(leaf.n_faces), vertex_face);
+  if (tested.edge_edge) edge_pairs(corners, leaf, leaf, edges, edges, edge_edge);
+  if (tested.vertex_face) vertex_face_pairs(corners, leaf, leaf, vertices, first_bits(leaf.n_faces), vertex_face);
 }
 
-// Loops only over features near the other leaf's box.
+// The features of a leaf that are near the other leaf's box.
+struct NearFeatures {
+  unsigned edges = 0, faces = 0, vertices = 0;
+  template <class Outcodes>
+  HPCCD_HD NearFeatures(const Outcodes& beyond, const LeafFeatures& leaf, TestedFeatures tested) {
+    if (tested.edge_edge) edges = beyond.edges(leaf);
+    if (tested.vertex_face) faces = beyond.faces(leaf), vertices = beyond.vertices(leaf);
+  }
+};
+
+// Pairs these features of a, one by one, with these of b. Not inlined: copies in each caller increased compile time by
+// half and made no scene faster.
+template <class A, class B, class When>
+[[gnu::noinline]] void near_pairs(When when, const LeafFeatures& a, const LeafFeatures& b,
+                                  const typename B::Lanes& lanes_b, const NearFeatures& of_a, const NearFeatures& of_b,
+                                  bool neighbours, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+  using Against = CornersAgainst<A, B, When>;
+  const unsigned edges = of_b.edges ? of_a.edges : 0, faces = of_b.vertices ? of_a.faces : 0,
+                 vertices = of_b.faces ? of_a.vertices : 0;
+  const Against corners(when, a, b, lanes_b, corners_of(a, edges, faces) | vertices,
+                        neighbours ? Against::Leaves::neighbours : Against::Leaves::strangers);
+  if (edges) edge_pairs(corners, a, b, edges, of_b.edges, edge_edge);
+  if (vertices) vertex_face_pairs(corners, a, b, vertices, of_b.faces, vertex_face);
+  if (faces) face_vertex_pairs(corners, a, b, faces, of_b.vertices, vertex_face);
+}
+
 template <class A, class B, class When>
 HPCCD_HD void pairs_between(When when, const LeafFeatures& a, const LeafFeatures& b, const Node& node_a,
                             const Node& node_b, TestedFeatures tested, CandidateBuffer& edge_edge,
                             CandidateBuffer& vertex_face) {
   const typename A::Lanes lanes_a(when, a);
   const typename B::Lanes lanes_b(when, b);
-  const typename A::Outcodes near_a(when, a, lanes_a, bounds_of(node_b));
-  const typename B::Outcodes near_b(when, b, lanes_b, bounds_of(node_a));
-  const unsigned edges_a = tested.edge_edge ? near_a.edges(a) : 0, edges_b = near_b.edges(b);
-  const bool edges = edges_a && edges_b, neighbours = node_a.mesh == node_b.mesh;
-  Sharing a_with_b, b_with_a;
-  if (edges) {
-    if (neighbours) find_shared(a, near_a.corners(a), b, near_b.corners(b), a_with_b, b_with_a);
-    // Loops over the smaller set.
-    if (__builtin_popcount(edges_a) <= __builtin_popcount(edges_b))
-      edge_pairs<A, B>(when, a, b, lanes_b, a_with_b, edges_a, edges_b, edge_edge);
-    else
-      edge_pairs<B, A>(when, b, a, lanes_a, b_with_a, edges_b, edges_a, edge_edge);
-  }
-  if (!tested.vertex_face) return;
-  const bool known = edges || !neighbours;  // not worth computing for a few vertices
-  const unsigned faces_a = near_a.faces(a), faces_b = near_b.faces(b);
-  if (faces_b)
-    vertex_face_pairs<A, B>(when, a, b, lanes_b, known ? &a_with_b : nullptr, near_a.vertices(a), faces_b, vertex_face);
-  if (faces_a)
-    vertex_face_pairs<B, A>(when, b, a, lanes_a, known ? &b_with_a : nullptr, near_b.vertices(b), faces_a, vertex_face);
+  const NearFeatures of_a(typename A::Outcodes(when, a, lanes_a, bounds_of(node_b)), a, tested);
+  const NearFeatures of_b(typename B::Outcodes(when, b, lanes_b, bounds_of(node_a)), b, tested);
+  const bool neighbours = node_a.mesh == node_b.mesh;
+  // Of the smaller set one by one.
+  if (__builtin_popcount(of_a.edges) <= __builtin_popcount(of_b.edges))
+    near_pairs<A, B>(when, a, b, lanes_b, of_a, of_b, neighbours, edge_edge, vertex_face);
+  else
+    near_pairs<B, A>(when, b, a, lanes_a, of_b, of_a, neighbours, edge_edge, vertex_face);
 }
 
 // Boxes of sixteen leaves.

@@ -1,48 +1,83 @@
 // SPDX-License-Identifier: Apache-2.0
-// Features of two leaves that share a vertex: they are not candidates. Most pairs of leaves are neighbours on a mesh
-// (60 to 80 % on the published scenes), so shared vertices are found once per pair of leaves, not per pair of
-// features. The code is branch-free, since which corners are shared is unpredictable. Part of leaf_pairs.inl and
-// leaf_edge_faces.inl.
+// What is computed once for a corner of one leaf, for all features that have it: on which sides of it the corners of
+// another leaf lie, and which features of the other leaf share it, since those are not candidates. (Most pairs of
+// leaves are neighbours on a mesh, 60 to 80 % on the published scenes.) A leaf has fewer corners than features. The
+// code is branch-free, since which corners are shared is unpredictable. Part of leaf_pairs.inl and leaf_edge_faces.inl.
 
 #include "traverse/leaf_features.inl"
 
-// The features of a leaf that contain a vertex, if it is one of these corners of the leaf.
-struct FeaturesAt {
-  std::uint32_t corner;  // a vertex, or a number that no leaf has
-  std::uint32_t edges, faces;
-
-  HPCCD_HD FeaturesAt(const LeafFeatures& leaf, unsigned corners, std::uint32_t vertex) {
-    unsigned same = equal16(leaf.corners, vertex);
-    if (leaf.many) same |= equal16(leaf.corners + 16, vertex) << 16;
-    same &= corners;
-    const std::uint32_t number = static_cast<std::uint32_t>(__builtin_ctz(same | 1u << none)), all = same ? ~0u : 0,
-                        at = number & all;
-    corner = number, edges = leaf.corners_of->edges_at[at] & all, faces = leaf.corners_of->faces_at[at] & all;
-  }
-  static constexpr std::uint32_t none = 31;
-  static_assert(none >= CornersOf::most_corners);
+// Features of a leaf, and those corners of it that are vertices of others.
+struct FeatureBits {
+  std::uint32_t edges, faces, corners;
 };
-
-// For each corner of one leaf, the features of another leaf that contain it.
-struct Sharing {
-  std::uint32_t edges[FeaturesAt::none + 1] = {}, faces[FeaturesAt::none + 1] = {};
-  HPCCD_HD void set(std::uint32_t corner, std::uint32_t with_edges, std::uint32_t with_faces) {
-    edges[corner] = with_edges, faces[corner] = with_faces;
-  }
-};
-
-// Finds the vertices that two leaves share, among these corners of each.
-HPCCD_HD void find_shared(const LeafFeatures& a, unsigned corners_a, const LeafFeatures& b, unsigned corners_b,
-                          Sharing& a_with_b, Sharing& b_with_a) {
-  for_each(corners_a, [&](std::uint32_t i) {
-    const FeaturesAt of_b(b, corners_b, a.corners[i]);
-    a_with_b.set(i, of_b.edges, of_b.faces);
-    b_with_a.set(of_b.corner, a.corners_of->edges_at[i], a.corners_of->faces_at[i]);
-  });
+HPCCD_HD FeatureBits operator|(const FeatureBits& a, const FeatureBits& b) {
+  return {a.edges | b.edges, a.faces | b.faces, a.corners | b.corners};
 }
 
-// The same for a leaf and itself.
-HPCCD_HD void find_own(const LeafFeatures& leaf, Sharing& own) {
-  for (std::uint32_t i = 0; i < leaf.n_corners; ++i)
-    own.set(i, leaf.corners_of->edges_at[i], leaf.corners_of->faces_at[i]);
+// The features of a leaf that contain a vertex.
+HPCCD_HD FeatureBits features_at(const LeafFeatures& leaf, std::uint32_t vertex) {
+  unsigned same = equal16(leaf.corners, vertex);
+  if (leaf.many) same |= equal16(leaf.corners + 16, vertex) << 16;
+  same &= first_bits(leaf.n_corners);  // corners of other leaves follow
+  const std::uint32_t all = same ? ~0u : 0, at = static_cast<std::uint32_t>(__builtin_ctz(same | 1u << 31)) & all;
+  return {leaf.corners_of->edges_at[at] & all, leaf.corners_of->faces_at[at] & all, same};
+}
+
+// Corners of leaf a against all of leaf b; for one leaf, a and b are the same.
+template <class A, class B, class When>
+class CornersAgainst {
+ public:
+  using Outcodes = typename B::Outcodes;
+  enum class Leaves { same, neighbours, strangers };  // two leaves of one mesh are neighbours, of two meshes strangers
+
+  HPCCD_HD CornersAgainst(When when, const LeafFeatures& a, const LeafFeatures& b, const typename B::Lanes& lanes_b,
+                          unsigned corners_a, Leaves leaves)
+      : of_(*a.corners_of) {
+    for_each(corners_a, [&](std::uint32_t i) {
+      beyond_[i] = Outcodes(when, b, lanes_b, A::box_of(a, i));
+      shared_[i] = leaves == Leaves::neighbours ? features_at(b, a.corners[i])
+                   : leaves == Leaves::same     ? FeatureBits{of_.edges_at[i], of_.faces_at[i], 1u << i}
+                                                : FeatureBits{};
+    });
+  }
+
+  // Of leaf b: features near a vertex, an edge or a face of leaf a that share no vertex with it.
+  HPCCD_HD unsigned faces_near_vertex(const LeafFeatures& b, std::uint32_t i) const {
+    return beyond_[i].faces(b) & ~shared_[i].faces;
+  }
+  HPCCD_HD unsigned edges_near_edge(const LeafFeatures& b, std::uint32_t k) const {
+    const std::uint32_t i = of_.edge[0][k], j = of_.edge[1][k];
+    return (beyond_[i] & beyond_[j]).edges(b) & ~(shared_[i].edges | shared_[j].edges);
+  }
+  HPCCD_HD unsigned faces_near_edge(const LeafFeatures& b, std::uint32_t k) const {
+    const std::uint32_t i = of_.edge[0][k], j = of_.edge[1][k];
+    return (beyond_[i] & beyond_[j]).faces(b) & ~(shared_[i].faces | shared_[j].faces);
+  }
+  HPCCD_HD unsigned vertices_near_face(const LeafFeatures& b, std::uint32_t k) const {
+    return beyond_face(k).vertices(b) & ~shared_with_face(k).corners;
+  }
+  HPCCD_HD unsigned edges_near_face(const LeafFeatures& b, std::uint32_t k) const {
+    return beyond_face(k).edges(b) & ~shared_with_face(k).edges;
+  }
+
+ private:
+  HPCCD_HD Outcodes beyond_face(std::uint32_t k) const {
+    return beyond_[of_.face[0][k]] & beyond_[of_.face[1][k]] & beyond_[of_.face[2][k]];
+  }
+  HPCCD_HD FeatureBits shared_with_face(std::uint32_t k) const {
+    return shared_[of_.face[0][k]] | shared_[of_.face[1][k]] | shared_[of_.face[2][k]];
+  }
+
+  const CornersOf& of_;
+  Outcodes beyond_[CornersOf::most_corners];
+  FeatureBits shared_[CornersOf::most_corners];
+};
+
+// The corners of these edges and faces of a leaf.
+HPCCD_HD unsigned corners_of(const LeafFeatures& leaf, unsigned edges, unsigned faces) {
+  const CornersOf& of = *leaf.corners_of;
+  unsigned corners = 0;
+  for_each(edges, [&](std::uint32_t k) { corners |= 1u << of.edge[0][k] | 1u << of.edge[1][k]; });
+  for_each(faces, [&](std::uint32_t k) { corners |= 1u << of.face[0][k] | 1u << of.face[1][k] | 1u << of.face[2][k]; });
+  return corners;
 }

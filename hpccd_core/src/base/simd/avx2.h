@@ -151,16 +151,8 @@ HPCCD_HD void store(float* out, Row x) { _mm256_store_ps(out, x.v); }
 HPCCD_HD Row operator+(Row a, Row b) { return {_mm256_add_ps(a.v, b.v)}; }
 HPCCD_HD Row operator-(Row a, Row b) { return {_mm256_sub_ps(a.v, b.v)}; }
 HPCCD_HD Row operator*(Row a, Row b) { return {_mm256_mul_ps(a.v, b.v)}; }
-HPCCD_HD Row min(Row a, Row b) { return {_mm256_min_ps(a.v, b.v)}; }
-HPCCD_HD Row max(Row a, Row b) { return {_mm256_max_ps(a.v, b.v)}; }
 HPCCD_HD RowMask less(Row a, Row b) { return {_mm256_cmp_ps(a.v, b.v, _CMP_LT_OQ)}; }
 HPCCD_HD RowMask operator&(RowMask a, RowMask b) { return {_mm256_and_ps(a.v, b.v)}; }
-// Lanes are not permuted at once: declared only.
-inline constexpr bool picks_at_once = false;
-struct Picks16 {};
-Picks16 picks(const std::uint8_t* which);
-Row picked(const float* row, Picks16 p);
-Row picked(const float* row, const float* next, Picks16 p);
 
 struct SideBits {
   __m256i v;

@@ -171,19 +171,6 @@ HPCCD_HD Rows16<n> load_rows(const float (&rows)[n][16]) {
   return r;
 }
 
-// Which of 16 numbers, or of 32 in two rows, each lane takes.
-inline constexpr bool picks_at_once = true;
-struct Picks16 {
-  __m512i v;
-};
-HPCCD_HD Picks16 picks(const std::uint8_t* which) {
-  return {_mm512_cvtepu8_epi32(_mm_load_si128(reinterpret_cast<const __m128i*>(which)))};
-}
-HPCCD_HD Floats16 picked(const float* row, Picks16 p) { return {_mm512_permutexvar_ps(p.v, _mm512_load_ps(row))}; }
-HPCCD_HD Floats16 picked(const float* row, const float* next, Picks16 p) {
-  return {_mm512_permutex2var_ps(_mm512_load_ps(row), p.v, _mm512_load_ps(next))};
-}
-
 // Sixteen bytes.
 struct Bytes16 {
   __m128i v;

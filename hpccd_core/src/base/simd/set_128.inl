@@ -158,16 +158,8 @@ HPCCD_HD void store(float* out, Row x) { __builtin_memcpy(out, &x, sizeof x); }
 HPCCD_HD Row operator+(Row a, Row b) { return {a.v + b.v}; }
 HPCCD_HD Row operator-(Row a, Row b) { return {a.v - b.v}; }
 HPCCD_HD Row operator*(Row a, Row b) { return {a.v * b.v}; }
-HPCCD_HD Row min(Row a, Row b) { return {min4(a.v, b.v)}; }
-HPCCD_HD Row max(Row a, Row b) { return {max4(a.v, b.v)}; }
 HPCCD_HD RowMask less(Row a, Row b) { return {a.v < b.v}; }
 HPCCD_HD RowMask operator&(RowMask a, RowMask b) { return {a.v & b.v}; }
-// Lanes are not permuted at once: declared only.
-inline constexpr bool picks_at_once = false;
-struct Picks16 {};
-Picks16 picks(const std::uint8_t* which);
-Row picked(const float* row, Picks16 p);
-Row picked(const float* row, const float* next, Picks16 p);
 
 struct SideBits {
   Mask4 v;
