@@ -3,7 +3,7 @@
 // are neighbours in a mesh, so their boxes overlap; but where the surface is curved, most edges are on one side of the
 // planes. Part of leaf_edge_faces.inl.
 
-#include "traverse/sharing.inl"
+#include "traverse/corners_against.inl"
 
 // Error bounds of the heights of two leaves' corners above the planes of their faces. X is the largest extent of the
 // box of both. Coordinates, at most 2.25, have an error of r = 2^-23 and less than 1e-15 more; half an ulp of 1 is r

@@ -9,8 +9,8 @@ namespace {
 #include "traverse/candidate_rows.inl"
 #include "traverse/face_planes.inl"
 
-// Pairs these faces of a, one by one, with these edges of b. Planes come before boxes: they reject more and take less
-// time.
+// Pairs these faces of a, one by one, with these edges of b. Planes come before boxes: they reject more and take
+// less time.
 template <class A, class B>
 [[gnu::noinline]] void face_edge_pairs(const LeafFeatures& a, const LeafFeatures& b, const typename B::Lanes& lanes_b,
                                        const PlaneErrors& errors, LeafPairOf leaves, unsigned faces_a, unsigned edges_b,

@@ -8,7 +8,7 @@ namespace {
 
 #include "elementary/kdop_lanes.inl"
 #include "traverse/candidate_rows.inl"
-#include "traverse/sharing.inl"
+#include "traverse/corners_against.inl"
 
 // Orders the pairs from `begin` on: of two edges the one with the lower number comes first. Works on whole rows, into
 // the space beyond the last pair, since loops of a few iterations cost more than their work.
@@ -52,9 +52,9 @@ HPCCD_HD void face_vertex_pairs(const Against& corners, const LeafFeatures& a, c
 template <class Kernel, class When>
 HPCCD_HD void pairs_within(When when, const LeafFeatures& leaf, TestedFeatures tested, CandidateBuffer& edge_edge,
                            CandidateBuffer& vertex_face) {
-  using Against = CornersAgainst<Kernel, Kernel, When>;
-  const Against corners(when, leaf, leaf, typename Kernel::Lanes(when, leaf), first_bits(leaf.n_corners),
-                        Against::Leaves::same);
+  const unsigned all = first_bits(leaf.n_corners);
+  CornersAgainst<Kernel, Kernel, When> corners(leaf, leaf, all, LeafPairOf::same);
+  corners.compare(when, leaf, leaf, typename Kernel::Lanes(when, leaf), all);
   const unsigned edges = first_bits(leaf.n_edges), vertices = first_bits(leaf.n_vertices);
   if (tested.edge_edge) edge_pairs(corners, leaf, leaf, edges, edges, edge_edge);
   if (tested.vertex_face) vertex_face_pairs(corners, leaf, leaf, vertices, first_bits(leaf.n_faces), vertex_face);
@@ -76,11 +76,11 @@ template <class A, class B, class When>
 [[gnu::noinline]] void near_pairs(When when, const LeafFeatures& a, const LeafFeatures& b,
                                   const typename B::Lanes& lanes_b, const NearFeatures& of_a, const NearFeatures& of_b,
                                   bool neighbours, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-  using Against = CornersAgainst<A, B, When>;
   const unsigned edges = of_b.edges ? of_a.edges : 0, faces = of_b.vertices ? of_a.faces : 0,
                  vertices = of_b.faces ? of_a.vertices : 0;
-  const Against corners(when, a, b, lanes_b, corners_of(a, edges, faces) | vertices,
-                        neighbours ? Against::Leaves::neighbours : Against::Leaves::strangers);
+  const unsigned wanted = corners_of(a, edges, faces) | vertices;
+  CornersAgainst<A, B, When> corners(a, b, wanted, neighbours ? LeafPairOf::neighbours : LeafPairOf::strangers);
+  corners.compare(when, a, b, lanes_b, wanted);
   if (edges) edge_pairs(corners, a, b, edges, of_b.edges, edge_edge);
   if (vertices) vertex_face_pairs(corners, a, b, vertices, of_b.faces, vertex_face);
   if (faces) face_vertex_pairs(corners, a, b, faces, of_b.vertices, vertex_face);
@@ -114,10 +114,10 @@ struct LeavesInMotion {
   }
   template <class Box>
   HPCCD_HD Mask16 apart(const BoxLanes& lanes, const Box& b, std::uint32_t axis) const {
-    const Mask16 below = less(lanes[high(0, axis)], all16(b[low(0, axis)])) &
-                         less(lanes[high(1, axis)], all16(b[low(1, axis)]));
-    const Mask16 above = less(all16(b[high(0, axis)]), lanes[low(0, axis)]) &
-                         less(all16(b[high(1, axis)]), lanes[low(1, axis)]);
+    const Mask16 below =
+        less(lanes[high(0, axis)], all16(b[low(0, axis)])) & less(lanes[high(1, axis)], all16(b[low(1, axis)]));
+    const Mask16 above =
+        less(all16(b[high(0, axis)]), lanes[low(0, axis)]) & less(all16(b[high(1, axis)]), lanes[low(1, axis)]);
     return below | above;
   }
   HPCCD_HD bool are_apart(const Kdop& a, const Kdop& b) const { return HPCCD_ISA::are_apart(lanes_of(a), lanes_of(b)); }

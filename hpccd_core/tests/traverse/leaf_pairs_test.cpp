@@ -191,6 +191,40 @@ struct BlockPairsTest : LeafPairsTest {
         return true;
     return false;
   }
+  // Separated along one direction at the start and at a time, by more than a margin and `more`.
+  static bool apart_until(const Kdop& a, const Kdop& b, const KdopMargin& margin, float time, double more) {
+    const auto open = [&](const float* high, const float* low, int i) {
+      const double at_t0 = double{low[i]} - high[i], at_t1 = double{low[i + 8]} - high[i + 8];
+      return std::min(at_t0, at_t0 + time * (at_t1 - at_t0)) > margin.in[i] + more;
+    };
+    for (int i = 0; i < 8; ++i)
+      if (open(a.high, b.low, i) || open(b.high, a.low, i)) return true;
+    return false;
+  }
+  // The pairs of leaves that find(simd, block, block, pairs) returns, on every instruction set, are some of those for
+  // which `at_most` holds, among them all for which `at_least` holds, but for those that their k-DOPs separate.
+  template <class AtLeast, class AtMost, class Find, class Separated>
+  void expect_between(AtLeast&& at_least, AtMost&& at_most, Find&& find, Separated&& separated) {
+    Pairs least, most;
+    for (std::uint32_t a = 0; a < tree.leaves.size(); ++a)
+      for (std::uint32_t b = a; b < tree.leaves.size(); ++b) {
+        const Node &node_a = tree.node_of_leaf(a), &node_b = tree.node_of_leaf(b);
+        if (a == b || (at_least(node_a, node_b) && !separated(a, b, 0))) least.push_back({a, b});
+        if (a == b || (at_most(node_a, node_b) && !separated(a, b, 8e-6))) most.push_back({a, b});
+      }
+    EXPECT_LT(least.size(), tree.leaves.size() * (tree.leaves.size() + 1) / 2);
+    for (const Simd simd : simd_levels()) {
+      Pairs found;
+      for (std::size_t a = 0; a < tree.blocks.size(); ++a)
+        for (std::size_t b = a; b < tree.blocks.size(); ++b) {
+          LeafPair pairs[block_pairs_capacity];
+          const std::uint32_t n = find(simd, tree.blocks[a], tree.blocks[b], pairs);
+          for (std::uint32_t i = 0; i < n; ++i) found.push_back(std::minmax(pairs[i].first, pairs[i].second));
+        }
+      std::ranges::sort(found);
+      EXPECT_TRUE(std::ranges::includes(found, least) && std::ranges::includes(most, found)) << name_of(simd);
+    }
+  }
   void expect_leaves_that_overlap() const {
     Pairs expected;
     for (std::uint32_t a = 0; a < tree.leaves.size(); ++a)
@@ -240,6 +274,39 @@ TEST_P(BlockPairsTest, AreTheLeavesThatOverlapByMoreThanTheExcess) {
     std::ranges::sort(found);
     EXPECT_TRUE(std::ranges::includes(found, least) && std::ranges::includes(most, found)) << name_of(simd);
   }
+}
+
+// A part of the motion, and snapshots: no pair of leaves is left out that the boxes of nodes leave near, and only pairs
+// are that those boxes, a little larger, leave near.
+TEST_P(BlockPairsTest, AreTheLeavesThatAreNearUntilATime) {
+  const KdopMargin margin(motion.margin_of_mesh(0) * 2 + motion.rounding, motion.map.scale);
+  for (const float until : {0.0f, 0.3f, 0.99f})
+    for (const float reach : {-1.0f, 0.0f, 0.05f})
+      expect_between(
+          [&](const Node& a, const Node& b) {
+            return reach < 0 ? a.overlap_until(b, until) : a.near_at_start(b, reach - 1e-6f);
+          },
+          [&](const Node& a, const Node& b) {
+            return reach < 0 ? a.overlap_until(b, until) : a.near_at_start(b, reach + 1e-6f);
+          },
+          [&](Simd simd, const Block& a, const Block& b, LeafPair* pairs) {
+            return block_pairs_until(simd)(tree, a, b, until, reach, margin, pairs);
+          },
+          [&](std::uint32_t a, std::uint32_t b, double more) {
+            return apart_until(kdop_of(a), kdop_of(b), margin, until, more);
+          });
+}
+
+TEST_P(BlockPairsTest, AreTheLeavesThatAreNearInASnapshot) {
+  motion.update(*scene, test::view(first), pool);
+  refit(tree, motion, {}, pool);
+  for (const float reach : {0.0f, 0.02f, 0.3f})
+    expect_between([&](const Node& a, const Node& b) { return a.near_in_snapshot(b, reach - 1e-6f); },
+                   [&](const Node& a, const Node& b) { return a.near_in_snapshot(b, reach + 1e-6f); },
+                   [&](Simd simd, const Block& a, const Block& b, LeafPair* pairs) {
+                     return block_pairs_in_snapshot(simd)(tree, a, b, reach, pairs);
+                   },
+                   [](std::uint32_t, std::uint32_t, double) { return false; });
 }
 
 // Boxes and k-DOPs grow with the separation: those of an earlier motion with another separation are invalid.

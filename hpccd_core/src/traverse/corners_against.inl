@@ -23,25 +23,29 @@ HPCCD_HD FeatureBits features_at(const LeafFeatures& leaf, std::uint32_t vertex)
   return {leaf.corners_of->edges_at[at] & all, leaf.corners_of->faces_at[at] & all, same};
 }
 
-// Corners of leaf a against all of leaf b; for one leaf, a and b are the same.
+// Two leaves of one mesh are neighbours, of two meshes strangers.
+enum class LeafPairOf { same, neighbours, strangers };
+
+// Corners of leaf a against all of leaf b, which may be the same.
 template <class A, class B, class When>
 class CornersAgainst {
  public:
-  using Outcodes = typename B::Outcodes;
-  enum class Leaves { same, neighbours, strangers };  // two leaves of one mesh are neighbours, of two meshes strangers
-
-  HPCCD_HD CornersAgainst(When when, const LeafFeatures& a, const LeafFeatures& b, const typename B::Lanes& lanes_b,
-                          unsigned corners_a, Leaves leaves)
+  // Which features of b share these corners.
+  HPCCD_HD CornersAgainst(const LeafFeatures& a, const LeafFeatures& b, unsigned corners_a, LeafPairOf leaves)
       : of_(*a.corners_of) {
     for_each(corners_a, [&](std::uint32_t i) {
-      beyond_[i] = Outcodes(when, b, lanes_b, A::box_of(a, i));
-      shared_[i] = leaves == Leaves::neighbours ? features_at(b, a.corners[i])
-                   : leaves == Leaves::same     ? FeatureBits{of_.edges_at[i], of_.faces_at[i], 1u << i}
-                                                : FeatureBits{};
+      shared_[i] = leaves == LeafPairOf::neighbours ? features_at(b, a.corners[i])
+                   : leaves == LeafPairOf::same     ? FeatureBits{of_.edges_at[i], of_.faces_at[i], 1u << i}
+                                                    : FeatureBits{};
     });
   }
+  // On which sides of these corners those of b lie.
+  HPCCD_HD void compare(When when, const LeafFeatures& a, const LeafFeatures& b, const typename B::Lanes& lanes_b,
+                        unsigned corners_a) {
+    for_each(corners_a, [&](std::uint32_t i) { beyond_[i] = Outcodes(when, b, lanes_b, A::box_of(a, i)); });
+  }
 
-  // Of leaf b: features near a vertex, an edge or a face of leaf a that share no vertex with it.
+  // Features of b near a vertex, an edge or a face of a that share no vertex with it.
   HPCCD_HD unsigned faces_near_vertex(const LeafFeatures& b, std::uint32_t i) const {
     return beyond_[i].faces(b) & ~shared_[i].faces;
   }
@@ -49,18 +53,16 @@ class CornersAgainst {
     const std::uint32_t i = of_.edge[0][k], j = of_.edge[1][k];
     return (beyond_[i] & beyond_[j]).edges(b) & ~(shared_[i].edges | shared_[j].edges);
   }
-  HPCCD_HD unsigned faces_near_edge(const LeafFeatures& b, std::uint32_t k) const {
-    const std::uint32_t i = of_.edge[0][k], j = of_.edge[1][k];
-    return (beyond_[i] & beyond_[j]).faces(b) & ~(shared_[i].faces | shared_[j].faces);
-  }
   HPCCD_HD unsigned vertices_near_face(const LeafFeatures& b, std::uint32_t k) const {
     return beyond_face(k).vertices(b) & ~shared_with_face(k).corners;
   }
   HPCCD_HD unsigned edges_near_face(const LeafFeatures& b, std::uint32_t k) const {
-    return beyond_face(k).edges(b) & ~shared_with_face(k).edges;
+    return beyond_face(k).edges(b) & ~edges_sharing_face(k);
   }
+  HPCCD_HD unsigned edges_sharing_face(std::uint32_t k) const { return shared_with_face(k).edges; }
 
  private:
+  using Outcodes = typename B::Outcodes;
   HPCCD_HD Outcodes beyond_face(std::uint32_t k) const {
     return beyond_[of_.face[0][k]] & beyond_[of_.face[1][k]] & beyond_[of_.face[2][k]];
   }
