@@ -30,19 +30,15 @@ enum class LeafPairOf { same, neighbours, strangers };
 template <class A, class B, class When>
 class CornersAgainst {
  public:
-  // Which features of b share these corners.
-  HPCCD_HD CornersAgainst(const LeafFeatures& a, const LeafFeatures& b, unsigned corners_a, LeafPairOf leaves)
+  HPCCD_HD CornersAgainst(When when, const LeafFeatures& a, const LeafFeatures& b, const typename B::Lanes& lanes_b,
+                          unsigned corners_a, LeafPairOf leaves)
       : of_(*a.corners_of) {
     for_each(corners_a, [&](std::uint32_t i) {
+      beyond_[i] = Outcodes(when, b, lanes_b, A::box_of(a, i));
       shared_[i] = leaves == LeafPairOf::neighbours ? features_at(b, a.corners[i])
                    : leaves == LeafPairOf::same     ? FeatureBits{of_.edges_at[i], of_.faces_at[i], 1u << i}
                                                     : FeatureBits{};
     });
-  }
-  // On which sides of these corners those of b lie.
-  HPCCD_HD void compare(When when, const LeafFeatures& a, const LeafFeatures& b, const typename B::Lanes& lanes_b,
-                        unsigned corners_a) {
-    for_each(corners_a, [&](std::uint32_t i) { beyond_[i] = Outcodes(when, b, lanes_b, A::box_of(a, i)); });
   }
 
   // Features of b near a vertex, an edge or a face of a that share no vertex with it.
@@ -53,13 +49,16 @@ class CornersAgainst {
     const std::uint32_t i = of_.edge[0][k], j = of_.edge[1][k];
     return (beyond_[i] & beyond_[j]).edges(b) & ~(shared_[i].edges | shared_[j].edges);
   }
+  HPCCD_HD unsigned faces_near_edge(const LeafFeatures& b, std::uint32_t k) const {
+    const std::uint32_t i = of_.edge[0][k], j = of_.edge[1][k];
+    return (beyond_[i] & beyond_[j]).faces(b) & ~(shared_[i].faces | shared_[j].faces);
+  }
   HPCCD_HD unsigned vertices_near_face(const LeafFeatures& b, std::uint32_t k) const {
     return beyond_face(k).vertices(b) & ~shared_with_face(k).corners;
   }
   HPCCD_HD unsigned edges_near_face(const LeafFeatures& b, std::uint32_t k) const {
-    return beyond_face(k).edges(b) & ~edges_sharing_face(k);
+    return beyond_face(k).edges(b) & ~shared_with_face(k).edges;
   }
-  HPCCD_HD unsigned edges_sharing_face(std::uint32_t k) const { return shared_with_face(k).edges; }
 
  private:
   using Outcodes = typename B::Outcodes;

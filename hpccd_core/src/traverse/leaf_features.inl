@@ -212,29 +212,35 @@ struct Leaves {
     }
   };
 
-  // Beyond which sides of a box or a plane corners lie.
-  template <std::uint32_t sets>
-  struct Sides {
-    Bytes16 of[sets][groups];
+  // On which sides of a box corners lie.
+  struct Outcodes {
+    Bytes16 of[When::sets][groups];
 
-    // sides(group, lane, beyond): for the corners from that lane on.
-    template <class Beyond>
-    HPCCD_HD void find(const LeafFeatures& leaf, Beyond&& sides) {
+    HPCCD_HD Outcodes() {}
+    template <class Box>
+    HPCCD_HD Outcodes(When when, const LeafFeatures& leaf, const Lanes& lanes, const Box& box) {
+      const auto& b = when.bounds(box);
       for (std::uint32_t g = 0; g < groups; ++g) {
-        SideBits bits[sets][16 / row_width] = {};
+        SideBits bits[When::sets][16 / row_width] = {};
         for (std::uint32_t i = 0; i < 16 && (row_width == 16 || 16 * g + i < leaf.n_corners); i += row_width) {
-          RowMask beyond[6 * sets] = {};
-          sides(g, i, beyond);
-          for (std::uint32_t s = 0; s < sets; ++s) bits[s][i / row_width] = side_bits(beyond + 6 * s);
+          RowMask beyond[6 * When::sets];
+          When::sides(lanes.at(g, i), b, beyond);
+          for (std::uint32_t s = 0; s < When::sets; ++s) bits[s][i / row_width] = side_bits(beyond + 6 * s);
         }
-        for (std::uint32_t s = 0; s < sets; ++s) of[s][g] = to_bytes(bits[s]);
+        for (std::uint32_t s = 0; s < When::sets; ++s) of[s][g] = to_bytes(bits[s]);
       }
+    }
+    HPCCD_HD Outcodes operator&(const Outcodes& other) const {
+      Outcodes both;
+      for (std::uint32_t s = 0; s < When::sets; ++s)
+        for (std::uint32_t g = 0; g < groups; ++g) both.of[s][g] = of[s][g] & other.of[s][g];
+      return both;
     }
     // Bit j: feature j of sixteen, whose corners are numbered by `which`, has no side beyond which all its corners lie.
     template <std::uint32_t n>
     HPCCD_HD unsigned near16(const std::uint8_t* const (&which)[n]) const {
       Bytes16 beyond;
-      for (std::uint32_t s = 0; s < sets; ++s) {
+      for (std::uint32_t s = 0; s < When::sets; ++s) {
         Bytes16 all = corner_bytes(of[s], which[0]);
         for (std::uint32_t j = 1; j < n; ++j) all = all & corner_bytes(of[s], which[j]);
         beyond = s == 0 ? all : beyond | all;
@@ -256,27 +262,10 @@ struct Leaves {
       unsigned m = 0;
       for (std::uint32_t g = 0; g < groups; ++g) {
         Bytes16 beyond = of[0][g];
-        if constexpr (sets > 1) beyond = beyond | of[1][g];
+        if constexpr (When::sets > 1) beyond = beyond | of[1][g];
         m |= zeros(beyond) << (16 * g);
       }
       return m & first_bits(leaf.n_corners);
-    }
-  };
-
-  struct Outcodes : Sides<When::sets> {
-    HPCCD_HD Outcodes() {}
-    template <class Box>
-    HPCCD_HD Outcodes(When when, const LeafFeatures& leaf, const Lanes& lanes, const Box& box) {
-      const auto& b = when.bounds(box);
-      this->find(leaf, [&](std::uint32_t group, std::uint32_t lane, RowMask(&beyond)[6 * When::sets]) {
-        When::sides(lanes.at(group, lane), b, beyond);
-      });
-    }
-    HPCCD_HD Outcodes operator&(const Outcodes& other) const {
-      Outcodes both;
-      for (std::uint32_t s = 0; s < When::sets; ++s)
-        for (std::uint32_t g = 0; g < groups; ++g) both.of[s][g] = this->of[s][g] & other.of[s][g];
-      return both;
     }
   };
 

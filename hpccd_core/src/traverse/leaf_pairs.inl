@@ -53,8 +53,8 @@ template <class Kernel, class When>
 HPCCD_HD void pairs_within(When when, const LeafFeatures& leaf, TestedFeatures tested, CandidateBuffer& edge_edge,
                            CandidateBuffer& vertex_face) {
   const unsigned all = first_bits(leaf.n_corners);
-  CornersAgainst<Kernel, Kernel, When> corners(leaf, leaf, all, LeafPairOf::same);
-  corners.compare(when, leaf, leaf, typename Kernel::Lanes(when, leaf), all);
+  const CornersAgainst<Kernel, Kernel, When> corners(when, leaf, leaf, typename Kernel::Lanes(when, leaf), all,
+                                                     LeafPairOf::same);
   const unsigned edges = first_bits(leaf.n_edges), vertices = first_bits(leaf.n_vertices);
   if (tested.edge_edge) edge_pairs(corners, leaf, leaf, edges, edges, edge_edge);
   if (tested.vertex_face) vertex_face_pairs(corners, leaf, leaf, vertices, first_bits(leaf.n_faces), vertex_face);
@@ -78,9 +78,8 @@ template <class A, class B, class When>
                                   bool neighbours, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
   const unsigned edges = of_b.edges ? of_a.edges : 0, faces = of_b.vertices ? of_a.faces : 0,
                  vertices = of_b.faces ? of_a.vertices : 0;
-  const unsigned wanted = corners_of(a, edges, faces) | vertices;
-  CornersAgainst<A, B, When> corners(a, b, wanted, neighbours ? LeafPairOf::neighbours : LeafPairOf::strangers);
-  corners.compare(when, a, b, lanes_b, wanted);
+  const CornersAgainst<A, B, When> corners(when, a, b, lanes_b, corners_of(a, edges, faces) | vertices,
+                                           neighbours ? LeafPairOf::neighbours : LeafPairOf::strangers);
   if (edges) edge_pairs(corners, a, b, edges, of_b.edges, edge_edge);
   if (vertices) vertex_face_pairs(corners, a, b, vertices, of_b.faces, vertex_face);
   if (faces) face_vertex_pairs(corners, a, b, faces, of_b.vertices, vertex_face);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The candidates for intersections of two leaves: with every instruction set just the edges and faces whose boxes at
-// t = 0 overlap and that share no vertex, except for edges that are certainly on one side of the face's plane.
+// t = 0 overlap and that share no vertex.
 #include "traverse/leaf_edge_faces.h"
 
 #include <gtest/gtest.h>
@@ -11,7 +11,6 @@
 
 #include "base/simd.h"
 #include "bvh/motion_bounds.h"
-#include "elementary/exact/intersection.h"
 #include "grid_scene.h"
 
 namespace hpccd {
@@ -26,37 +25,15 @@ struct LeafEdgeFacesTest : testing::Test {
   ThreadPool pool{1};
   MotionBounds motion;
   Tree tree;
-  std::vector<double> positions = test::sheet_positions(side, 0.5, lone);
 
-  // The sheets cross halfway.
-  void crumple(double by) {
+  // The sheets cross halfway, crumpled: in flat ones no edge is close to a face of its own leaf.
+  LeafEdgeFacesTest() {
+    auto positions = test::sheet_positions(side, 0.5, lone);
     std::mt19937 random(7);
-    std::uniform_real_distribution<double> way(-by, by);
-    for (double& x : positions) x += way(random);
-  }
-  void build_tree() {
+    std::uniform_real_distribution<double> crumple(-0.5, 0.5);
+    for (double& x : positions) x += crumple(random);
     motion.update(*scene, test::view(positions), pool);
     build(tree, *scene, features, motion, pool);
-  }
-
-  Vec3<double> at(std::uint32_t v) const { return {positions[3 * v], positions[3 * v + 1], positions[3 * v + 2]}; }
-
-  // In double precision. Volumes are six times as large as those of the tetrahedra.
-  struct Heights {
-    double one, other;
-    bool on_one_side(double beyond) const { return std::min(one, other) > beyond || std::max(one, other) < -beyond; }
-  };
-  Heights heights(std::uint32_t edge, std::uint32_t face) const {
-    const auto& corner = features.faces[face];
-    const Vec3<double> n = cross(at(corner[1]) - at(corner[0]), at(corner[2]) - at(corner[0]));
-    const auto height = [&](std::uint32_t v) { return dot(n, at(v) - at(corner[0])); };
-    return {height(features.edges[edge][0]), height(features.edges[edge][1])};
-  }
-  bool intersect(std::uint32_t edge, std::uint32_t face) const {
-    const auto& e = features.edges[edge];
-    const auto& f = features.faces[face];
-    const Vec3<double> q[5] = {at(e[0]), at(e[1]), at(f[0]), at(f[1]), at(f[2])};
-    return exact::intersect(q);
   }
 
   bool are_candidates(std::uint32_t edge, std::uint32_t face) const {
@@ -93,71 +70,23 @@ struct LeafEdgeFacesTest : testing::Test {
     return pairs;
   }
 
-  // All sets find the same ones. They are missing only if the edge is on one side of the plane, and do not intersect;
-  // and present only if it is not, up to rounding.
-  void expect_all(double rounding, std::size_t least_within, std::size_t least, std::size_t least_missing) const {
-    std::size_t within = 0, between = 0, missing = 0;
+  void expect_all(std::size_t least) const {
+    std::size_t within = 0, between = 0;
     for (const LeafRange& a : tree.leaves)
       for (const LeafRange& b : tree.leaves) {
         if (&b < &a) continue;
-        const Pairs expected = one_by_one(a, b), found = by(Simd::scalar, a, b);
-        ASSERT_TRUE(std::ranges::includes(expected, found));
-        for (const auto& [edge, face] : found) EXPECT_FALSE(heights(edge, face).on_one_side(rounding));
-        Pairs left_out;
-        std::ranges::set_difference(expected, found, std::back_inserter(left_out));
-        for (const auto& [edge, face] : left_out) {
-          EXPECT_TRUE(heights(edge, face).on_one_side(0));
-          EXPECT_FALSE(intersect(edge, face));
-        }
-        (&a == &b ? within : between) += found.size();
-        missing += left_out.size();
+        const Pairs expected = one_by_one(a, b);
+        (&a == &b ? within : between) += expected.size();
         for (const Simd simd : simd_levels())
-          ASSERT_EQ(by(simd, a, b), found)
+          ASSERT_EQ(by(simd, a, b), expected)
               << "leaves " << &a - tree.leaves.data() << " and " << &b - tree.leaves.data() << ", " << name_of(simd);
       }
-    EXPECT_GE(within, least_within);
-    EXPECT_GE(between, least);
-    EXPECT_GE(missing, least_missing);
+    EXPECT_GT(within, least / 50);
+    EXPECT_GT(between, least);
   }
 };
 
-// In flat sheets no edge is close to a face of its own leaf.
-TEST_F(LeafEdgeFacesTest, AreThoseThatOverlapAndShareNoVertexNorLieBesideThePlane) {
-  crumple(0.5);
-  build_tree();
-  expect_all(1e-2, 5, 1000, 1000);
-}
-
-// Nearly flat, far from the origin, by less than the rounding of the boxes: planes must leave whatever is undecided.
-TEST_F(LeafEdgeFacesTest, LeaveWhatRoundingHides) {
-  for (const double by : {1e-12, 1e-8, 1e-7, 1e-6, 1e-5, 1e-3}) {
-    positions.clear();
-    for (std::uint32_t sheet = 0; sheet < test::sheets; ++sheet) {
-      for (std::uint32_t i = 0; i < side * side; ++i)
-        positions.insert(positions.end(), {1e3 + i % side + 0.31 * sheet, 1e3 + i / side + 0.17 * sheet, 1e3});
-      for (std::uint32_t i = 0; i < lone; ++i) positions.insert(positions.end(), {1e3, 1e3, 1e3});
-    }
-    crumple(by);
-    build_tree();
-    expect_all(1e-2, 0, 1000, 0);
-  }
-}
-
-// Coordinates that are bent have no planes.
-TEST_F(LeafEdgeFacesTest, AreAllThatOverlapInBentCoordinates) {
-  crumple(0.5);
-  build_tree();
-  const auto missing = [&] {
-    std::size_t n = 0;
-    for (const LeafRange& a : tree.leaves)
-      for (const LeafRange& b : tree.leaves)
-        if (&a <= &b) n += one_by_one(a, b).size() - by(Simd::scalar, a, b).size();
-    return n;
-  };
-  EXPECT_GT(missing(), 0u);
-  tree.bent = true;
-  EXPECT_EQ(missing(), 0u);
-}
+TEST_F(LeafEdgeFacesTest, AreThoseThatOverlapAndShareNoVertex) { expect_all(1000); }
 
 }  // namespace
 }  // namespace hpccd
