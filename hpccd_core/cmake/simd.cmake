@@ -15,7 +15,7 @@ function(hpccd_compile_kernels target set)
 endfunction()
 
 # Small tables are cleared for each pair of leaves; g++ clears them by "rep stos", whose start takes longer than the
-# stores: a twentieth of a step. Other compilers do not know the option.
+# stores: a thirtieth of a step. Other compilers do not know the option.
 include(CheckCXXCompilerFlag)
 set(hpccd_clear_by_vectors -mmemset-strategy=vector_loop:1024:noalign,libcall:-1:noalign)
 check_cxx_compiler_flag(${hpccd_clear_by_vectors} HPCCD_CLEARS_BY_VECTORS)
@@ -30,8 +30,8 @@ function(hpccd_compile_all_kernels target)
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64|amd64")
     hpccd_compile_kernels(${target} avx2 -mavx2 -mbmi ${hpccd_clear_by_vectors} -Wno-psabi -Wno-array-bounds)
     # g++ 12 warns of _mm512_undefined_pd() in its own header (GCC bug 105593).
-    hpccd_compile_kernels(${target} avx512 -mavx512f -mavx512dq -mavx512bw -mavx512vl -mbmi
-      ${hpccd_clear_by_vectors} -mprefer-vector-width=512 -Wno-psabi -Wno-maybe-uninitialized -Wno-uninitialized -Wno-array-bounds)
+    hpccd_compile_kernels(${target} avx512 -mavx512f -mavx512dq -mavx512bw -mavx512vl -mbmi ${hpccd_clear_by_vectors}
+      -mprefer-vector-width=512 -Wno-psabi -Wno-maybe-uninitialized -Wno-uninitialized -Wno-array-bounds)
     target_compile_definitions(${target} PUBLIC HPCCD_X86)
   elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|AARCH64|arm64|ARM64")
     hpccd_compile_kernels(${target} neon -Wno-array-bounds)
