@@ -53,13 +53,13 @@ def test_a_separation_that_changes_nothing_forgets_nothing(again):
         scene.add_mesh(name, faces, static=name != "a")
     detector = hc.Detector(scene, minimum_separation=1e-3, backend="cpu", threads=1)
     steps = [detector.collision_free_step(start, end) for _ in range(5)]
-    assert detector.stats["node_pairs"] == 0  # what is known to be near results, without the tree
+    assert detector.stats["leaf_pairs"] == 0  # what is known to be near results, without the tree
     again(detector)
     assert detector.collision_free_step(start, end) == steps[-1]
-    assert detector.stats["node_pairs"] == 0
+    assert detector.stats["leaf_pairs"] == 0
     detector.set_separation("a", "b", 2e-3)
     detector.collision_free_step(start, end)
-    assert detector.stats["node_pairs"] > 0
+    assert detector.stats["leaf_pairs"] > 0
 
 
 @pytest.mark.parametrize("never", ["static", "ignored", "within"])
