@@ -5,6 +5,7 @@
 // features works as if the tree had been fitted to the positions.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <span>
 #include <vector>
@@ -82,5 +83,15 @@ class PlacedMeshes {
   std::uint32_t last_state_ = 0;
   bool built_ = false, placed_ = false;
 };
+
+// The position of a vertex, from its mesh's pose if there are placed meshes.
+inline std::array<double, 3> position(const MotionBounds& snapshot, const PlacedMeshes* placed, std::uint32_t vertex) {
+  if (placed) {
+    const Vec3<double> x = placed->position(vertex);
+    return {x.x, x.y, x.z};
+  }
+  const double* x = snapshot.vertices[vertex].t0;
+  return {x[0], x[1], x[2]};
+}
 
 }  // namespace hpccd

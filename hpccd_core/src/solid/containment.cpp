@@ -26,15 +26,6 @@ bool within(const double* x, const Extent& e) {
   return true;
 }
 
-std::array<double, 3> position(const MotionBounds& snapshot, const PlacedMeshes* placed, std::uint32_t vertex) {
-  if (placed) {
-    const Vec3<double> x = placed->position(vertex);
-    return {x.x, x.y, x.z};
-  }
-  const double* x = snapshot.vertices[vertex].t0;
-  return {x[0], x[1], x[2]};
-}
-
 // Following the list reads all vertices of the mesh: 1,000 of them in the time of one decision.
 bool list_would_pay(std::size_t vertices, std::size_t of_mesh) { return vertices >= 16 && 1000 * vertices >= of_mesh; }
 

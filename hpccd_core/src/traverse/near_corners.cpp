@@ -29,15 +29,6 @@ NodePair near_leaves(const Tree& tree, NodePair p, SquareOfGap&& square_of_gap) 
   return p;
 }
 
-std::array<double, 3> position(const MotionBounds& snapshot, const PlacedMeshes* placed, std::uint32_t vertex) {
-  if (placed) {
-    const Vec3<double> x = placed->position(vertex);
-    return {x.x, x.y, x.z};
-  }
-  const double* x = snapshot.vertices[vertex].t0;
-  return {x[0], x[1], x[2]};
-}
-
 // The corners of a leaf, in coordinates of the boxes.
 template <class Real>
 struct LeafCorners {
