@@ -90,7 +90,7 @@ class DistanceCheck:
         if frame is not None:
             self._look_at(result, step.end, frame)
         elif counts:
-            self._lacks(f"distances at {step.end} ns: their frame is not certain")
+            self._lacks(f"distances at {step.end} ns: their frame, or the shape of a mesh at rest, is not certain")
 
     def settle(self, window: FrameWindow, frames: int | None = None) -> None:
         """Compare waiting results whose frame exists or can no longer arrive. frames: so far; None: all."""

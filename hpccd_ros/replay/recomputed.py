@@ -261,7 +261,8 @@ class Replay:
                 known, result, at = waiting.popleft()
                 step = session.step_of(known, result, at, *order.frames(known))
                 yield step
-                certain = not (step.missing and step.uncertain)
+                # A step without the frame at its start was not computed; its distances need the same shapes at rest.
+                certain = not (step.missing and (step.uncertain or (step.end_frame and self._lacks_rest(step))))
                 self.distances.settle_of(known, step.end_frame if certain else None, counts=not step.before_recording)
 
     def _results(self):
@@ -358,9 +359,10 @@ class Replay:
         rest, topologies = self._rest, step.end_frame.topologies
         recorded = self._valid(step.recorded, read_rest)[: len(topologies)]
         if recorded and recorded != rest.stamps(topologies):
-            if all(stamp in (-1, step.start) for stamp in recorded):
-                rest.forget()
-            rest.look_at(step.start_frame)
+            if step.start_frame is not None:
+                if all(stamp in (-1, step.start) for stamp in recorded):
+                    rest.forget()
+                rest.look_at(step.start_frame)
             if recorded != rest.stamps(topologies):
                 return "the recording lacks the frame that gave a mesh its shape at rest (mesh.NAME.ignored_at_rest)"
         return None

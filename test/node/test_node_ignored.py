@@ -45,6 +45,9 @@ def test_recorded_and_verified(start_node, tmp_path, from_the_start):
     stream.expect(0)
     if not from_the_start:
         assert stream.set("record", str(path)).successful
+        node.peer.readers = 2
+        for mesh in MESHES:
+            node.peer.await_readers(f"meshes/{mesh}/vertices")
     stream.expect(0)
     stream.expect(0)
     assert node.stop() == 0
@@ -56,5 +59,5 @@ def test_recorded_and_verified(start_node, tmp_path, from_the_start):
         assert (replay.verified, replay.diverged, replay.unverified) == (3, 0, 0), replay.first_divergence
         assert (found.verified, found.diverged) == (3, 0), found.first
     else:
-        assert replay.diverged == found.diverged == 0, "the shape at rest is not in the recording"
+        assert replay.diverged == found.diverged == 0, (replay.first_divergence, found.first)
         assert any(step.missing and "shape at rest" in step.missing for step in steps)
