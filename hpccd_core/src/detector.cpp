@@ -185,7 +185,8 @@ struct Detector::Impl {
     const std::lock_guard lock(open_edges_lock);
     if (const auto known = open_edges.find(mesh); known != open_edges.end()) return known->second;
     const Scene::Mesh& m = common.scene->meshes()[mesh];
-    return open_edges[mesh] = open_edge(std::span(common.scene->faces()).subspan(m.first_face, m.n_faces));
+    return open_edges[mesh] =
+               open_edge(std::span(common.scene->faces()).subspan(m.first_face, m.n_faces), cancellation());
   }
   std::mutex open_edges_lock;
   std::map<std::uint32_t, std::optional<std::array<std::uint32_t, 2>>> open_edges;

@@ -142,7 +142,7 @@ def assert_within_10_ms(new_detector, ask):
         if len(latencies) == 5:
             break
     assert len(latencies) >= 3, "it ends before it can be cancelled"
-    assert np.median(latencies) < 10, latencies
+    assert sorted(latencies)[-2] < 10, latencies  # the process may have other work once
 
 
 @pytest.mark.parametrize("case", CASES)

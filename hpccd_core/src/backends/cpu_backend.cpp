@@ -316,7 +316,7 @@ Intersections CpuBackend::intersections(const Snapshot& snapshot) {
 
 std::vector<Gap> CpuBackend::distances(const Snapshot& snapshot) {
   if (!mesh_pairs_) mesh_pairs_.emplace(shared_.rules, shared_.scene->meshes().size());
-  if (!containment_) containment_.emplace(*shared_.scene, shared_.features, *mesh_pairs_);
+  if (!containment_) containment_.emplace(*shared_.scene, shared_.features, *mesh_pairs_, shared_.cancellation);
   NearestPairs nearest(*mesh_pairs_, shared_.rules, &shared_.common.filter.view(), shared_.features, snapshot.motion,
                        snapshot.tree, shared_.common.thickness, snapshot.placed);
   DistanceSearch search(snapshot.tree, shared_.rules, shared_.options.simd, nearest);
@@ -386,7 +386,7 @@ MovedPair CpuBackend::moved_pair(Positions vertices, std::array<std::uint32_t, 2
   counts_ = {};
   topologies_.resize(shared_.scene->meshes().size());
   for (const std::uint32_t mesh : meshes)
-    if (!topologies_[mesh]) topologies_[mesh] = topology_of(*shared_.scene, mesh);
+    if (!topologies_[mesh]) topologies_[mesh] = topology_of(*shared_.scene, mesh, shared_.cancellation);
   return {shared_.tree.motion(),   shared_.features,        meshes,
           *topologies_[meshes[0]], *topologies_[meshes[1]], shared_.pool};
 }

@@ -2,6 +2,7 @@
 #include "solid/closed.h"
 
 #include <algorithm>
+#include <functional>
 #include <numeric>
 
 namespace hpccd {
@@ -18,7 +19,8 @@ bool has_three(const std::array<std::uint32_t, 3>& f) { return f[0] != f[1] && f
 
 }  // namespace
 
-std::optional<std::array<std::uint32_t, 2>> open_edge(std::span<const std::array<std::uint32_t, 3>> faces) {
+std::optional<std::array<std::uint32_t, 2>> open_edge(std::span<const std::array<std::uint32_t, 3>> faces,
+                                                      const Cancellation& cancellation) {
   std::vector<FaceSide> sides;
   sides.reserve(3 * faces.size());
   for (const auto& f : faces) {
@@ -28,7 +30,7 @@ std::optional<std::array<std::uint32_t, 2>> open_edge(std::span<const std::array
       sides.push_back({std::min(a, b), std::max(a, b), a < b});
     }
   }
-  std::ranges::sort(sides);
+  std::ranges::sort(sides, heeding(cancellation, std::less<>()));
   // In pairs of opposite directions, each pair of another edge.
   for (std::size_t i = 0; i < sides.size(); i += 2) {
     const auto same_edge = [&](std::size_t j) {
@@ -40,21 +42,23 @@ std::optional<std::array<std::uint32_t, 2>> open_edge(std::span<const std::array
   return std::nullopt;
 }
 
-bool is_closed(std::span<const std::array<std::uint32_t, 3>> faces) {
-  return std::ranges::any_of(faces, has_three) && !open_edge(faces);
+bool is_closed(std::span<const std::array<std::uint32_t, 3>> faces, const Cancellation& cancellation) {
+  return std::ranges::any_of(faces, has_three) && !open_edge(faces, cancellation);
 }
 
-std::vector<std::uint32_t> connected_components(const Features& features) {
+std::vector<std::uint32_t> connected_components(const Features& features, const Cancellation& cancellation) {
   std::vector<std::uint32_t> lowest(features.n_vertices);
   std::iota(lowest.begin(), lowest.end(), 0u);
   const auto find = [&](std::uint32_t v) {
     while (lowest[v] != v) v = lowest[v] = lowest[lowest[v]];
     return v;
   };
-  for (const auto& edge : features.edges) {
-    const std::uint32_t a = find(edge[0]), b = find(edge[1]);
-    lowest[std::max(a, b)] = std::min(a, b);
-  }
+  in_pieces(cancellation, features.edges.size(), 1 << 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint32_t a = find(features.edges[i][0]), b = find(features.edges[i][1]);
+      lowest[std::max(a, b)] = std::min(a, b);
+    }
+  });
   // Entries point to lower vertices, whose own are final.
   for (std::uint32_t v = 0; v < lowest.size(); ++v) lowest[v] = lowest[lowest[v]];
   return lowest;

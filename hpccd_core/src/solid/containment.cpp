@@ -49,17 +49,18 @@ std::size_t ContainmentMemory::bytes() const {
 }
 
 // Only of meshes that may lie inside others or contain them.
-Containment::Containment(const Scene& scene, const Features& features, const MeshPairs& pairs)
+Containment::Containment(const Scene& scene, const Features& features, const MeshPairs& pairs,
+                         const Cancellation& cancellation)
     : scene_(scene), features_(features), pairs_(pairs), closed_(scene.meshes().size(), false) {
   std::vector<char> paired(closed_.size(), false);
   for (std::size_t i = 0; i < pairs.size(); ++i)
     if (pairs[i][0] != pairs[i][1]) paired[pairs[i][0]] = paired[pairs[i][1]] = true;
-  const std::vector<std::uint32_t> component = connected_components(features);
+  const std::vector<std::uint32_t> component = connected_components(features, cancellation);
   first_.push_back(0);
   for (std::uint32_t m = 0; m < closed_.size(); ++m) {
     const Scene::Mesh& mesh = scene.meshes()[m];
     const std::span faces(features.faces);
-    closed_[m] = paired[m] && is_closed(faces.subspan(mesh.first_face, mesh.n_faces));
+    closed_[m] = paired[m] && is_closed(faces.subspan(mesh.first_face, mesh.n_faces), cancellation);
     for (std::uint32_t v = mesh.first_vertex; paired[m] && v < mesh.first_vertex + mesh.n_vertices; ++v)
       if (component[v] == v) vertices_.push_back(v);
     first_.push_back(static_cast<std::uint32_t>(vertices_.size()));

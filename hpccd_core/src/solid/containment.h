@@ -35,7 +35,7 @@ struct ContainmentMemory {
 class Containment {
  public:
   // The arguments must outlive the object.
-  Containment(const Scene& scene, const Features& features, const MeshPairs& pairs);
+  Containment(const Scene& scene, const Features& features, const MeshPairs& pairs, const Cancellation& cancellation);
 
   // Sets Gap::inside of each pair of meshes, in the order of the pairs. The tree is that of the snapshot; placed: its
   // meshes if they are at poses, otherwise null. Throws Cancelled.

@@ -25,10 +25,12 @@ using exact::operator-;
 // is not quite the direction: an entry has an error of 4 u, a coordinate in the frame, a sum of three products, one of
 // 3 (4 + 3) u = 21 u, or 2.4e-15; rounded up:
 constexpr double frame_error = 4e-15;
+// Faces or nodes of a mesh between two looks at a request to cancel: about 1 ms.
+constexpr std::size_t grain = 1 << 13;
 
 }  // namespace
 
-MeshTopology topology_of(const Scene& scene, std::uint32_t number) {
+MeshTopology topology_of(const Scene& scene, std::uint32_t number, const Cancellation& cancellation) {
   const Scene::Mesh& mesh = scene.meshes()[number];
   const std::span faces(scene.faces().data() + mesh.first_face, mesh.n_faces);
   std::vector<std::uint32_t> lowest(mesh.n_vertices);
@@ -38,13 +40,15 @@ MeshTopology topology_of(const Scene& scene, std::uint32_t number) {
     return v;
   };
   std::vector<char> seen(mesh.n_vertices, false);
-  for (const auto& face : faces)
-    for (std::size_t i = 0; i < 3; ++i) {
-      const std::uint32_t v = find(face[i] - mesh.first_vertex), w = find(face[(i + 1) % 3] - mesh.first_vertex);
-      lowest[std::max(v, w)] = std::min(v, w);
-      seen[face[i] - mesh.first_vertex] = true;
-    }
-  MeshTopology topology{mesh.first_face, mesh.n_faces, is_closed(faces), {}};
+  in_pieces(cancellation, faces.size(), grain, [&](std::size_t begin, std::size_t end) {
+    for (const auto& face : faces.subspan(begin, end - begin))
+      for (std::size_t i = 0; i < 3; ++i) {
+        const std::uint32_t v = find(face[i] - mesh.first_vertex), w = find(face[(i + 1) % 3] - mesh.first_vertex);
+        lowest[std::max(v, w)] = std::min(v, w);
+        seen[face[i] - mesh.first_vertex] = true;
+      }
+  });
+  MeshTopology topology{mesh.first_face, mesh.n_faces, is_closed(faces, cancellation), {}};
   for (std::uint32_t v = 0; v < lowest.size(); ++v)
     if (seen[v] && lowest[v] == v) topology.representatives.push_back(mesh.first_vertex + v);
   return topology;
@@ -74,10 +78,12 @@ void MovedPair::build(BoxedMesh& mesh, const Features& features, const Extent& e
   for (int k = 0; k < 3; ++k) size = std::max(size, up * extent.high[k] - up * extent.low[k]);
   const Curve curve({up * extent.low[0], up * extent.low[1], up * extent.low[2]}, size);
   std::vector<OnCurve> order(n);
-  for (std::uint32_t i = 0; i < n; ++i) {
-    const auto& f = features.faces[first + i];
-    order[i] = {curve.code(position(f[0]) + position(f[1]) + position(f[2])), i};
-  }
+  in_pieces(cancellation_, n, grain, [&](std::size_t begin, std::size_t end) {
+    for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
+      const auto& f = features.faces[first + i];
+      order[i] = {curve.code(position(f[0]) + position(f[1]) + position(f[2])), i};
+    }
+  });
   sort_by_code(order, cancellation_);
   mesh.faces.reserve(n), mesh.face_numbers.reserve(n), mesh.nodes.reserve(n / 2 + 1);
   for (const OnCurve& place : order) {
@@ -86,6 +92,7 @@ void MovedPair::build(BoxedMesh& mesh, const Features& features, const Extent& e
   }
   mesh.nodes.push_back({{}, 0, 0, n});
   for (std::uint32_t i = 0; i < mesh.nodes.size(); ++i) {
+    if (i % grain == 0) heed();
     const auto [box, none, begin, end] = mesh.nodes[i];
     if (end - begin <= leaf_size) continue;
     // Between the halves of the smallest cell that contains all, or anywhere in the smallest of all.
@@ -103,6 +110,7 @@ void MovedPair::build(BoxedMesh& mesh, const Features& features, const Extent& e
 
 void MovedPair::fit(BoxedMesh& mesh) const {
   for (std::size_t i = mesh.nodes.size(); i-- > 0;) {
+    if (i % grain == 0) heed();
     BoxedMesh::Node& node = mesh.nodes[i];
     V low{INFINITY, INFINITY, INFINITY}, high{-INFINITY, -INFINITY, -INFINITY};
     const auto include = [&](const V& l, const V& h) {
@@ -122,9 +130,11 @@ const MovedPair::Bits& MovedPair::bits() const {
   if (!bits_) {
     exact::BitRange range;
     for (const BoxedMesh& mesh : meshes_)
-      for (const auto& face : mesh.faces)
-        for (const std::uint32_t v : face)
-          for (int k = 0; k < 3; ++k) range.include(exact::OddMantissa(snapshot_.vertices[v].t0[k]));
+      in_pieces(cancellation_, mesh.faces.size(), grain, [&](std::size_t begin, std::size_t end) {
+        for (const auto& face : std::span(mesh.faces).subspan(begin, end - begin))
+          for (const std::uint32_t v : face)
+            for (int k = 0; k < 3; ++k) range.include(exact::OddMantissa(snapshot_.vertices[v].t0[k]));
+      });
     bits_ = Bits{range.low, range.bits()};
   }
   return *bits_;

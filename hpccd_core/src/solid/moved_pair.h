@@ -22,7 +22,7 @@ struct MeshTopology {
   bool closed;
   std::vector<std::uint32_t> representatives;  // a vertex of each part that faces connect
 };
-MeshTopology topology_of(const Scene& scene, std::uint32_t mesh);
+MeshTopology topology_of(const Scene& scene, std::uint32_t mesh, const Cancellation& cancellation);
 
 // The faces of one mesh, in a tree of boxes of double precision. It depends on positions alone, so that results do not
 // depend on the queries before, as they would by the refitted tree of the detector. Coordinates are multiplied by a

@@ -48,7 +48,10 @@ class HullOfPlaces {
  public:
   explicit HullOfPlaces(const MovedPair& pair) : pair_(pair) {}
   // The place that is farthest in a direction.
-  V support(const V& d) const { return farthest(pair_.b(), d) - farthest(pair_.a(), {-d.x, -d.y, -d.z}); }
+  V support(const V& d) const {
+    pair_.heed();
+    return farthest(pair_.b(), d) - farthest(pair_.a(), {-d.x, -d.y, -d.z});
+  }
 
  private:
   V farthest(const BoxedMesh& mesh, const V& d) const {
