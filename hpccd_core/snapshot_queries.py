@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from typing import Generic, NoReturn, cast
 
 import numpy as np
@@ -19,7 +18,7 @@ from .proximity import Gap, Intersections, Proximity
 from .result_types import DistancesResult, IntersectionsResult, ProximityResult
 from .results import INTERSECTION_ARRAYS, result_of, with_outputs
 
-_NOT_GIVEN = math.nan
+_NOT_GIVEN = float("nan")  # an object of its own: math.nan may be given, and is invalid
 _ONE_FRAME = "the positions of one frame; for a motion call detect(vertices_t0, vertices_t1)"
 
 

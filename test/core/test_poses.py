@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Meshes that keep their shape, at poses: bit-identical to the same queries of the positions."""
 
+import math
 import pickle
 
 import numpy as np
@@ -267,5 +268,7 @@ def test_positions_and_poses_are_not_mixed_up():
         hc.Detector(plain).distances()
     with pytest.raises(TypeError, match="distance is missing"):
         hc.Detector(plain).proximity(SHEET)
+    with pytest.raises(ValueError, match="distance: must be finite"):
+        hc.Detector(plain).proximity(SHEET, math.nan)
     with pytest.raises(ValueError, match="not offered with detail"):
         hc.Detector(Shapes([(BALL, BALL_FACES)]).scene, detail=0.5).distances(poses=pose)
