@@ -24,7 +24,7 @@ class SnapshotCalls:
     _detailed: object | None
     _posed: list[str]  # names of the meshes that take a pose
     _n_others: int  # vertices of the meshes without a shape
-    _has_static_shapes: bool
+    _has_shapes: bool
 
     def _ask(self, query: str, vertices: object, stream: object, *more: object, poses: object = None) -> Any:
         if poses is not None or vertices is None:
@@ -39,7 +39,7 @@ class SnapshotCalls:
 
     def _ask_at(self, query: str, vertices: object, poses: object, *more: object) -> Any:
         """A query of meshes at poses. vertices: of the meshes without a shape."""
-        if vertices is None and poses is None and not self._posed and not self._has_static_shapes:
+        if vertices is None and poses is None and not self._has_shapes:
             raise TypeError("vertices: give positions or, for meshes that were added with a shape, poses; got neither")
         if self._detailed is not None:
             raise ValueError("poses: not offered with detail; give the positions, or make a detector without detail")

@@ -262,7 +262,7 @@ class Detector(
         self._layout = scene.layout
         self._posed = scene._posed_meshes()
         self._n_others = scene._vertices_without_shape()
-        self._has_static_shapes = self._n_others < self.n_vertices
+        self._has_shapes = scene._has_shapes()
         self._n_mesh_pairs = scene._n_enabled_pairs()
         self._mesh_numbers = {name: number for number, name in enumerate(self._layout.mesh_names)}
         options = _core.Options()

@@ -474,6 +474,9 @@ class Scene:
         for name, values in state["_calls"]:
             self._repeat(name, values)
 
+    def _has_shapes(self) -> bool:
+        return any(name == "set_shape" for name, _ in self._calls)
+
     def _vertices_without_shape(self) -> int:
         """Number of vertices of the meshes that have no shape."""
         return self.n_vertices - sum(len(values[1]) for name, values in self._calls if name == "set_shape")

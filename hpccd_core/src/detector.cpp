@@ -332,7 +332,7 @@ struct Detector::Impl {
   std::vector<rigid::Pose> checked_poses(std::span<const Pose> poses, Positions others) const {
     std::size_t n = 0;
     for (const Scene::Mesh& mesh : common.scene->meshes())
-      if (!mesh.has_shape()) n += mesh.n_vertices;
+      if (!mesh.shape) n += mesh.n_vertices;
     if (others.n != n * options().worlds)
       throw InvalidArgument(
           "vertices: the meshes without a shape have " + std::to_string(n) + " vertices" +
@@ -358,7 +358,7 @@ struct Detector::Impl {
 
   bool all_have_shapes() const {
     return std::ranges::all_of(common.scene->meshes(),
-                               [](const Scene::Mesh& mesh) { return mesh.has_shape() || mesh.n_vertices == 0; });
+                               [](const Scene::Mesh& mesh) { return mesh.shape || mesh.n_vertices == 0; });
   }
 
   // placed(cpu, counts): the query of meshes that are placed. given(positions): that of their positions.

@@ -193,6 +193,24 @@ def test_no_pose_is_the_identity():
     assert bits(detector.positions_at()) == bits(np.concatenate([BALL, BALL + [2.5, 0, 0]]))
 
 
+def test_a_mesh_without_vertices_takes_its_row():
+    empty = np.empty((0, 3)), np.empty((0, 3), np.uint32)
+    shapes = Shapes([(BALL, BALL_FACES), empty, (BOX, BOX_FACES)], self_collision=False)
+    poses = np.array([still_pose(np.random.default_rng(0), 2) for _ in range(3)])
+    by_poses, by_positions = (hc.Detector(shapes.scene, backend="cpu", outputs=ALL_OUTPUTS) for _ in "ab")
+    assert_equal(by_poses, by_positions, poses, shapes.positions(poses))
+    assert hc.Detector(Shapes([empty], static={0}).scene).distances() == []
+
+
+def test_the_sign_of_a_zero_in_a_pose_counts():
+    triangle = np.array([[0, -0.0, -0.0], [1, -0.0, -0.0], [0, 1, -0.0]]), [[0, 1, 2]]
+    shapes = Shapes([triangle, (BALL + [0, 0, 3], BALL_FACES)], static={1}, self_collision=False)
+    by_poses, by_positions = (hc.Detector(shapes.scene, backend="cpu", outputs=ALL_OUTPUTS) for _ in "ab")
+    for zero in (0.0, -0.0):
+        poses = np.array([[0.5, zero, zero, 0, 0, 0, 1]])
+        assert_equal(by_poses, by_positions, poses, shapes.positions(poses))
+
+
 def test_changed_thickness_filters_and_pickled_scenes_count():
     shapes = Shapes([(BALL, BALL_FACES), (BOX, BOX_FACES)], self_collision=False)
     shapes.scene.ignore_faces("m0", range(40), "m1")

@@ -147,9 +147,9 @@ class HPCCD_API Scene {
     std::uint32_t n_edges;                      ///< number of its edges in edges()
     std::optional<Plane> plane = std::nullopt;  ///< as given to add_plane; its mesh has no vertices
     std::vector<double> thickness = {};         ///< as given to set_thickness; empty: zero
-    std::vector<double> shape = {};             ///< as given to set_shape; empty: none
-    /// Whether its vertices are given by its shape, and by a pose unless it is static.
-    bool has_shape() const { return !shape.empty(); }
+    /// As given to set_shape: its vertices are given by it, and by a pose unless the mesh is static. A mesh without
+    /// vertices may have one too.
+    std::optional<std::vector<double>> shape = std::nullopt;
   };
   /// All meshes, in the order added.
   const std::vector<Mesh>& meshes() const { return meshes_; }

@@ -35,11 +35,10 @@ void once(std::uint32_t& state, std::uint32_t fitted, F&& f) {
   for (ActiveWait wait; at.load(std::memory_order_acquire) != fitted;) wait.turn();
 }
 
+// Bit by bit: the sign of a zero in a pose decides that of a coordinate.
 bool same(const rigid::Pose& a, const rigid::Pose& b) {
-  const auto numbers = [](const rigid::Pose& p) {
-    return std::array{p.turn.x, p.turn.y, p.turn.z, p.turn.w, p.shift.x, p.shift.y, p.shift.z};
-  };
-  return numbers(a) == numbers(b);
+  static_assert(sizeof a == 7 * sizeof(double));
+  return memcmp(&a, &b, sizeof a) == 0;
 }
 
 bool turns(const rigid::Pose& pose) { return rigid::any({pose.turn.x, pose.turn.y, pose.turn.z}); }
@@ -65,10 +64,11 @@ void PlacedMeshes::measure() {
   finest_ = std::numeric_limits<double>::infinity();
   for (const Scene::Mesh& m : scene_.meshes()) {
     Placed& mesh = meshes_.emplace_back();
-    mesh.shape = m.shape.data(), mesh.first_vertex = m.first_vertex;
+    const std::span shape = m.shape ? std::span<const double>(*m.shape) : std::span<const double>();
+    mesh.shape = shape.data(), mesh.first_vertex = m.first_vertex;
     double size = 0;
-    for (std::size_t i = 0; i < m.shape.size(); ++i) {
-      const double x = m.shape[i];
+    for (std::size_t i = 0; i < shape.size(); ++i) {
+      const double x = shape[i];
       mesh.local.low[i % 3] = std::min(mesh.local.low[i % 3], x);
       mesh.local.high[i % 3] = std::max(mesh.local.high[i % 3], x);
       mesh.largest = std::max(mesh.largest, std::fabs(x));

@@ -38,7 +38,7 @@ void widen(const Real* from, std::size_t n, double* to) {
 std::vector<std::uint32_t> posed_meshes(const Scene& scene) {
   std::vector<std::uint32_t> posed;
   for (std::uint32_t m = 0; m < scene.meshes().size(); ++m)
-    if (scene.meshes()[m].has_shape() && !scene.meshes()[m].options.is_static) posed.push_back(m);
+    if (scene.meshes()[m].shape && !scene.meshes()[m].options.is_static) posed.push_back(m);
   return posed;
 }
 
@@ -65,7 +65,7 @@ std::vector<double> place_meshes(const Scene& scene, std::span<const rigid::Pose
       double* to = all.data() + at;
       const std::size_t n = 3 * std::size_t{mesh.n_vertices};
       at += n;
-      if (!mesh.has_shape()) {
+      if (!mesh.shape) {
         if (others.is_double)
           widen(static_cast<const double*>(others.data) + of_others, n, to);
         else
@@ -73,10 +73,11 @@ std::vector<double> place_meshes(const Scene& scene, std::span<const rigid::Pose
         of_others += n;
         continue;
       }
+      const std::vector<double>& shape = *mesh.shape;
       const rigid::Placing placing(poses[world * scene.meshes().size() + m]);
       parallel_for(pool, mesh.n_vertices, 4096, [&](std::size_t begin, std::size_t end, int) {
         for (std::size_t i = 3 * begin; i < 3 * end; i += 3) {
-          const rigid::Vector x = placing({mesh.shape[i], mesh.shape[i + 1], mesh.shape[i + 2]});
+          const rigid::Vector x = placing({shape[i], shape[i + 1], shape[i + 2]});
           to[i] = x.x, to[i + 1] = x.y, to[i + 2] = x.z;
         }
       });

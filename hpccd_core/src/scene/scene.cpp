@@ -115,7 +115,7 @@ void Scene::set_shape(std::uint32_t mesh, std::span<const double> vertices) {
       throw InvalidArgument("shape[" + std::to_string(i / 3) +
                             "]: has a coordinate that is not finite or beyond 1e300; give the positions of the mesh in "
                             "its own frame");
-  m.shape.assign(vertices.begin(), vertices.end());
+  m.shape.emplace(vertices.begin(), vertices.end());
 }
 
 std::uint32_t Scene::add_plane(std::string name, const Plane& plane, bool is_static) {

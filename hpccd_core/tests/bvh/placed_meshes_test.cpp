@@ -101,6 +101,8 @@ TEST(Poses, AreNormalisedAndChecked) {
   EXPECT_THROW(poses_of_meshes(scene, std::vector<Pose>(2)), InvalidArgument);
   EXPECT_EQ(poses_of_meshes(scene, {}).size(), 2u);
   EXPECT_THROW(scene.set_shape(1, std::span(shape).first(6)), InvalidArgument);
+  scene.set_shape(scene.add_mesh("empty", {}, 0), {});
+  EXPECT_EQ(poses_of_meshes(scene, std::vector<Pose>(2)).size(), 3u);
 }
 
 }  // namespace
