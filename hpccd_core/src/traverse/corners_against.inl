@@ -33,8 +33,12 @@ class CornersAgainst {
   HPCCD_HD CornersAgainst(When when, const LeafFeatures& a, const LeafFeatures& b, const typename B::Lanes& lanes_b,
                           unsigned corners_a, LeafPairOf leaves)
       : of_(*a.corners_of) {
+    const typename A::Boxes boxes(when, a);
     for_each(corners_a, [&](std::uint32_t i) {
-      beyond_[i] = Outcodes(when, b, lanes_b, A::box_of(a, i));
+      if constexpr (When::grown == Grown::boxes)
+        beyond_[i] = Outcodes(b, lanes_b, boxes[i]);
+      else
+        beyond_[i] = Outcodes(b, lanes_b, when.bounds(boxes[i]));
       shared_[i] = leaves == LeafPairOf::neighbours ? features_at(b, a.corners[i])
                    : leaves == LeafPairOf::same     ? FeatureBits{of_.edges_at[i], of_.faces_at[i], 1u << i}
                                                     : FeatureBits{};

@@ -12,6 +12,7 @@ namespace {
 // Faces and edges of a leaf.
 struct NearFeatures {
   unsigned faces, edges;
+  HPCCD_HD int number() const { return __builtin_popcount(faces) + __builtin_popcount(edges); }
 };
 
 // Pairs these features of a, one by one, with these of b.
@@ -44,11 +45,16 @@ void leaf_edge_faces(const Tree& tree, const LeafRange& a, const LeafRange& b, C
         return near_edge_faces<A, A>(leaf_a, leaf_a, lanes_a, LeafPairOf::same, {first_bits(leaf_a.n_faces), 0},
                                      {0, first_bits(leaf_a.n_edges)}, edge_face);
     const typename B::Lanes lanes_b({}, leaf_b);
-    const typename A::Outcodes near_a({}, leaf_a, lanes_a, bounds_of(node_b));
-    const typename B::Outcodes near_b({}, leaf_b, lanes_b, bounds_of(node_a));
-    near_edge_faces<A, B>(
-        leaf_a, leaf_b, lanes_b, node_a.mesh == node_b.mesh ? LeafPairOf::neighbours : LeafPairOf::strangers,
-        {near_a.faces(leaf_a), near_a.edges(leaf_a)}, {near_b.faces(leaf_b), near_b.edges(leaf_b)}, edge_face);
+    const typename A::Outcodes near_a(leaf_a, lanes_a, bounds_of(node_b));
+    const typename B::Outcodes near_b(leaf_b, lanes_b, bounds_of(node_a));
+    const LeafPairOf leaves_of = node_a.mesh == node_b.mesh ? LeafPairOf::neighbours : LeafPairOf::strangers;
+    const NearFeatures features_a{near_a.faces(leaf_a), near_a.edges(leaf_a)},
+        features_b{near_b.faces(leaf_b), near_b.edges(leaf_b)};
+    // Of the smaller set one by one.
+    if (features_a.number() <= features_b.number())
+      near_edge_faces<A, B>(leaf_a, leaf_b, lanes_b, leaves_of, features_a, features_b, edge_face);
+    else
+      near_edge_faces<B, A>(leaf_b, leaf_a, lanes_a, leaves_of, features_b, features_a, edge_face);
   });
 }
 

@@ -25,14 +25,18 @@ struct FeatureBox {
   HPCCD_HD float operator[](std::uint32_t row) const { return at[row]; }
 };
 
-// Some corners: low and high bounds by 3 * end + axis. Both are the same array if boxes have not grown.
+// Some corners, as boxes: low and high bounds by 3 * end + axis. Both are the same array if boxes have not grown.
 struct Corners {
   Row low[Tree::coordinates], high[Tree::coordinates];
 };
 
-// When a corner lies beyond a box, below or above it along each axis. Throughout the motion (MotionBox::overlaps):
+// What is grown before corners are compared with boxes, once for a leaf.
+enum class Grown { nothing, corners, boxes };
+
+// When a corner lies beyond a box, below or above it along each axis. bounds(box): what corners are compared with.
+// Throughout the motion (MotionBox::overlaps):
 struct BothEnds {
-  static constexpr bool grows = false;      // whether corners are grown to boxes when they are loaded
+  static constexpr Grown grown = Grown::nothing;
   static constexpr std::uint32_t sets = 1;  // six sides
   template <class Box>
   HPCCD_HD const Box& bounds(const Box& b) const {
@@ -52,7 +56,7 @@ struct BothEnds {
 // Up to a time (Node::overlap_until): boxes at that time take the place of the second end; those of the corners grow
 // once.
 struct Until {
-  static constexpr bool grows = true;
+  static constexpr Grown grown = Grown::corners;
   static constexpr std::uint32_t sets = 1;
   float time;
   HPCCD_HD void grow(Corners& c) const {
@@ -80,7 +84,7 @@ struct Until {
 // Throughout the motion, if boxes of two meshes have grown by more than their separation requires (traverse/excess.h):
 // the boxes of the corners shrink by the excess.
 struct LessExcess : BothEnds {
-  static constexpr bool grows = true;
+  static constexpr Grown grown = Grown::corners;
   static constexpr bool only_grown = true;  // boxes that have not grown have no excess
   float excess;
   HPCCD_HD void grow(Corners& c) const {
@@ -89,18 +93,24 @@ struct LessExcess : BothEnds {
   }
 };
 
+// The box of a leaf or block, with each side moved outwards by by(side).
+template <class Box, class By>
+HPCCD_HD FeatureBox moved(const Box& b, By&& by) {
+  FeatureBox box;
+  for (std::uint32_t i = 0; i < n_bounds; ++i) box.at[i] = side_of_bound(i) == Side::low ? b[i] - by(i) : b[i] + by(i);
+  return box;
+}
+
 // At the start of the motion; boxes may be up to `reach` apart (Node::near_at_start).
 struct AtStart {
-  static constexpr bool grows = true;
+  static constexpr Grown grown = Grown::boxes;
   static constexpr std::uint32_t sets = 1;
+  static constexpr std::uint32_t rows = 3;  // that grow
   float reach;
-  HPCCD_HD void grow(Corners& c) const {
-    for (std::uint32_t axis = 0; axis < 3; ++axis)
-      c.low[axis] = c.low[axis] + all_lanes(-reach), c.high[axis] = c.high[axis] + all_lanes(reach);
-  }
+  HPCCD_HD float by(std::uint32_t) const { return reach; }
   template <class Box>
-  HPCCD_HD const Box& bounds(const Box& b) const {
-    return b;
+  HPCCD_HD FeatureBox bounds(const Box& b) const {
+    return moved(b, [&](std::uint32_t) { return reach; });
   }
   template <class Box>
   HPCCD_HD static void sides(const Corners& c, const Box& b, RowMask (&beyond)[6]) {
@@ -114,18 +124,14 @@ struct AtStart {
 // In one snapshot; boxes may be up to `reach` apart (Node::near_in_snapshot), along the axes and along the slanted
 // directions.
 struct InSnapshot {
-  static constexpr bool grows = true;
+  static constexpr Grown grown = Grown::boxes;
   static constexpr std::uint32_t sets = 2;
+  static constexpr std::uint32_t rows = Tree::coordinates;
   float reach;
-  HPCCD_HD void grow(Corners& c) const {
-    for (std::uint32_t row = 0; row < Tree::coordinates; ++row) {
-      const float by = row < 3 ? reach : slanted_reach(reach);
-      c.low[row] = c.low[row] + all_lanes(-by), c.high[row] = c.high[row] + all_lanes(by);
-    }
-  }
+  HPCCD_HD float by(std::uint32_t row) const { return row < 3 ? reach : slanted_reach(reach); }
   template <class Box>
-  HPCCD_HD const Box& bounds(const Box& b) const {
-    return b;
+  HPCCD_HD FeatureBox bounds(const Box& b) const {
+    return moved(b, [&](std::uint32_t i) { return by(i < n_bounds / 2 ? 0 : 3); });
   }
   template <class Box>
   HPCCD_HD static void sides(const Corners& c, const Box& b, RowMask (&beyond)[12]) {
@@ -139,7 +145,11 @@ struct InSnapshot {
 
 // The same for boxes that must touch.
 struct TouchingInSnapshot : InSnapshot {
-  static constexpr bool grows = false;
+  static constexpr Grown grown = Grown::nothing;
+  template <class Box>
+  HPCCD_HD const Box& bounds(const Box& b) const {
+    return b;
+  }
 };
 
 // A leaf's features, as plain pointers: any function of std::vector beyond data(), compiled here, could be linked into
@@ -178,9 +188,9 @@ struct Leaves {
   static constexpr std::uint32_t groups = many ? 2 : 1;
   static constexpr std::uint32_t high_rows = grown ? Tree::coordinates : 0, next_group = high_rows + Tree::coordinates;
 
-  // The corners of a leaf, grown to boxes when they are loaded if necessary.
+  // The corners of a leaf, to be compared with boxes.
   struct Lanes {
-    static constexpr bool own = When::grows;
+    static constexpr bool own = When::grown == Grown::corners;
     static constexpr std::uint32_t high_rows = own ? Tree::coordinates : Leaves::high_rows,
                                    next_group = high_rows + Tree::coordinates;
     CornerRow grown_rows[own ? groups * next_group : 1];
@@ -212,19 +222,52 @@ struct Leaves {
     }
   };
 
+  // The boxes of the corners of a leaf, one by one.
+  struct Boxes {
+    static constexpr bool own = When::grown == Grown::boxes;
+    static constexpr std::uint32_t high_rows = own ? Tree::coordinates : Leaves::high_rows,
+                                   next_group = high_rows + Tree::coordinates;
+    CornerRow grown_rows[own ? groups * next_group : 1];
+    const CornerRow* rows;
+
+    HPCCD_HD Boxes(When when, const LeafFeatures& leaf) : rows(own ? grown_rows : leaf.rows) {
+      if constexpr (own)
+        for (std::uint32_t g = 0; g < groups; ++g)
+          for (std::uint32_t i = 0; i < 16; i += row_width)
+            for (std::uint32_t row = 0; row < When::rows; ++row) {
+              const CornerRow* from = leaf.rows + g * Leaves::next_group + row;
+              CornerRow* to = grown_rows + g * next_group + row;
+              store(to->lane + i, load_row(from->lane + i) + all_lanes(-when.by(row)));
+              store(to[high_rows].lane + i, load_row(from[Leaves::high_rows].lane + i) + all_lanes(when.by(row)));
+            }
+    }
+    // One box, read in place.
+    struct Box {
+      const CornerRow* rows;
+      std::uint32_t lane;
+      HPCCD_HD float operator[](std::uint32_t bound) const {
+        const std::uint32_t row = bound / 6 * 3 + bound % 3;
+        return rows[side_of_bound(bound) == Side::low ? row : row + high_rows].lane[lane];
+      }
+    };
+    HPCCD_HD Box operator[](std::uint32_t corner) const {
+      if constexpr (many) return {rows + corner / 16 * next_group, corner % 16};
+      return {rows, corner};
+    }
+  };
+
   // On which sides of a box corners lie.
   struct Outcodes {
     Bytes16 of[When::sets][groups];
 
     HPCCD_HD Outcodes() {}
     template <class Box>
-    HPCCD_HD Outcodes(When when, const LeafFeatures& leaf, const Lanes& lanes, const Box& box) {
-      const auto& b = when.bounds(box);
+    HPCCD_HD Outcodes(const LeafFeatures& leaf, const Lanes& lanes, const Box& bounds) {
       for (std::uint32_t g = 0; g < groups; ++g) {
         SideBits bits[When::sets][16 / row_width] = {};
         for (std::uint32_t i = 0; i < 16 && (row_width == 16 || 16 * g + i < leaf.n_corners); i += row_width) {
           RowMask beyond[6 * When::sets];
-          When::sides(lanes.at(g, i), b, beyond);
+          When::sides(lanes.at(g, i), bounds, beyond);
           for (std::uint32_t s = 0; s < When::sets; ++s) bits[s][i / row_width] = side_bits(beyond + 6 * s);
         }
         for (std::uint32_t s = 0; s < When::sets; ++s) of[s][g] = to_bytes(bits[s]);
@@ -274,20 +317,6 @@ struct Leaves {
       return picked(of[0], of[1], load_bytes(which));
     else
       return picked(of[0], load_bytes(which));
-  }
-
-  // The box of one corner, read in place.
-  struct CornerBox {
-    const CornerRow* rows;
-    std::uint32_t lane;
-    HPCCD_HD float operator[](std::uint32_t bound) const {
-      const std::uint32_t row = bound / 6 * 3 + bound % 3;
-      return rows[side_of_bound(bound) == Side::low ? row : row + high_rows].lane[lane];
-    }
-  };
-  HPCCD_HD static CornerBox box_of(const LeafFeatures& leaf, std::uint32_t corner) {
-    if constexpr (many) return {leaf.rows + corner / 16 * next_group, corner % 16};
-    return {leaf.rows, corner};
   }
 };
 

@@ -91,8 +91,8 @@ HPCCD_HD void pairs_between(When when, const LeafFeatures& a, const LeafFeatures
                             CandidateBuffer& vertex_face) {
   const typename A::Lanes lanes_a(when, a);
   const typename B::Lanes lanes_b(when, b);
-  const NearFeatures of_a(typename A::Outcodes(when, a, lanes_a, bounds_of(node_b)), a, tested);
-  const NearFeatures of_b(typename B::Outcodes(when, b, lanes_b, bounds_of(node_a)), b, tested);
+  const NearFeatures of_a(typename A::Outcodes(a, lanes_a, when.bounds(bounds_of(node_b))), a, tested);
+  const NearFeatures of_b(typename B::Outcodes(b, lanes_b, when.bounds(bounds_of(node_a))), b, tested);
   const bool neighbours = node_a.mesh == node_b.mesh;
   // Of the smaller set one by one.
   if (__builtin_popcount(of_a.edges) <= __builtin_popcount(of_b.edges))
@@ -122,14 +122,6 @@ struct LeavesInMotion {
   HPCCD_HD bool are_apart(const Kdop& a, const Kdop& b) const { return HPCCD_ISA::are_apart(lanes_of(a), lanes_of(b)); }
   HPCCD_HD static KdopLanes lanes_of(const Kdop& k) { return {load16(k.low), load16(k.high)}; }
 };
-
-// The box of a leaf or block, with each side moved outwards.
-template <class Box, class By>
-HPCCD_HD FeatureBox moved(const Box& b, By&& by) {
-  FeatureBox box;
-  for (std::uint32_t i = 0; i < n_bounds; ++i) box.at[i] = side_of_bound(i) == Side::low ? b[i] - by(i) : b[i] + by(i);
-  return box;
-}
 
 // The same for two meshes with an excess.
 struct LeavesLessExcess : LeavesInMotion {

@@ -40,7 +40,14 @@ void walk(Boxes boxes, const Query& search, std::vector<NodePair>& stack, Worker
       if constexpr (std::is_same_v<typename Boxes::Ends, AtBlocks>) {
         LeafPair found[block_pairs_capacity];
         const std::uint32_t n = boxes.leaf_pairs(block_of(tree, p.a), block_of(tree, p.b), found);
-        for (std::uint32_t i = 0; i < n; ++i) at_leaves(found[i]);
+        for (std::uint32_t i = 0; i < n; ++i) {
+          // Leaves of a large scene are not in the cache, and hardware does not foresee which ones come.
+          if (i + 1 < n) {
+            if (found[i + 1].first != found[i].first) tree.prefetch(found[i + 1].first);
+            tree.prefetch(found[i + 1].second);
+          }
+          at_leaves(found[i]);
+        }
       } else {
         at_leaves({tree.nodes[p.a].leaf, tree.nodes[p.b].leaf});
       }
