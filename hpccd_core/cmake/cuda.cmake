@@ -105,7 +105,7 @@ function(hpccd_find_cuda)
   endif()
   hpccd_report_cuda("CUDA: ${HPCCD_NVCC}, for ${shown}")
 
-  foreach(source gpu/pipeline gpu/test_lists gpu/likely_stages gpu/separation_stages gpu/integer_stages gpu/snapshot_stages gpu/point_stages gpu/nearest_stages gpu/places_stages gpu/places_in_integers gpu/hints gpu/device gpu/results_to_device gpu/sort hybrid/cuda_device)
+  foreach(source gpu/pipeline gpu/test_lists gpu/likely_stages gpu/separation_stages gpu/integer_stages gpu/snapshot_stages gpu/point_stages gpu/nearest_stages gpu/placed_search gpu/places_stages gpu/places_in_integers gpu/hints gpu/device gpu/results_to_device gpu/sort hybrid/cuda_device)
     string(REPLACE "/" "_" name "${source}")
     set(object "${CMAKE_CURRENT_BINARY_DIR}/${name}.o")
     add_custom_command(OUTPUT "${object}"

@@ -361,7 +361,8 @@ struct Detector::Impl {
                                [](const Scene::Mesh& mesh) { return mesh.shape || mesh.n_vertices == 0; });
   }
 
-  // placed(cpu, counts): the query of meshes that are placed. given(positions): that of their positions.
+  // placed(cpu, counts): the query of meshes that are placed, by the CPU unless it changes last_backend.
+  // given(positions): that of their positions.
   template <class Placed, class Given>
   auto at_poses(std::span<const Pose> poses, Positions others, Placed&& placed, Given&& given) {
     const std::vector<rigid::Pose> of_meshes = checked_poses(poses, others);
@@ -371,9 +372,10 @@ struct Detector::Impl {
         CpuBackend& cpu = backends().cpu();
         if (!cpu.place(of_meshes)) return std::nullopt;
         Counts counts;
+        last_backend = Backend::cpu;
         std::optional<Answer> a = placed(cpu, counts);
         profiler().end();
-        last_backend = asked = Backend::cpu;
+        asked = last_backend;
         found = counts;
         return a;
       });
@@ -607,9 +609,16 @@ std::vector<Gap> Detector::distances_at(std::span<const Pose> poses, Positions o
   return impl_->at_poses(
       poses, others,
       [&](CpuBackend& cpu, Counts& counts) {
-        std::vector<Gap> gaps = cpu.distances_at_poses();
-        counts = {{"gaps", gaps.size()}};
-        return gaps;
+        std::optional<std::vector<Gap>> gaps;
+        // Not with `auto`: a CPU searches small meshes in less time than a device takes to start.
+        if (impl_->options().backend == Backend::gpu && impl_->backends().works(Backend::gpu))
+          gaps = impl_->backends().gpu().distances_at_poses(cpu.placed_meshes());
+        if (gaps)
+          impl_->last_backend = Backend::gpu;
+        else
+          gaps = cpu.distances_at_poses();
+        counts = {{"gaps", gaps->size()}};
+        return std::move(*gaps);
       },
       [&](Positions vertices) { return distances(vertices); });
 }

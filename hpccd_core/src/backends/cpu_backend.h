@@ -42,6 +42,7 @@ class CpuBackend final : public DetectionBackend {
   Intersections intersections_at_poses();
   std::vector<Gap> distances_at_poses();
   Vec3<double> position_at_poses(std::uint32_t vertex) const { return placed_->position(vertex); }
+  const PlacedMeshes& placed_meshes() const { return *placed_; }
   std::optional<WindingNumbers> winding_numbers(Positions vertices, Positions points, std::uint32_t mesh) override;
   std::optional<SignedDistances> signed_distances(Positions vertices, Positions points, std::uint32_t mesh) override;
   std::optional<double> separating_translation(Positions vertices, std::array<std::uint32_t, 2> meshes,

@@ -51,6 +51,7 @@ auto GpuBackend::attempt(Compute&& compute) -> std::optional<decltype(compute())
     failures_.failed(e.what());
     has_tree_ = false;  // nothing on the device is valid after a failure
     near_.forget();
+    placed_search_.reset();
     shared_.profiler.mark("gpu_failed");
     return std::nullopt;
   }
@@ -78,6 +79,13 @@ std::optional<Intersections> GpuBackend::intersections(Positions vertices) {
 std::optional<std::vector<Gap>> GpuBackend::distances(Positions vertices) {
   std::vector<Gap> gaps;
   const std::optional<bool> complete = attempt([&] { return find_gaps(vertices, gaps); });
+  if (!complete.value_or(false)) return std::nullopt;
+  return gaps;
+}
+
+std::optional<std::vector<Gap>> GpuBackend::distances_at_poses(const PlacedMeshes& placed) {
+  std::vector<Gap> gaps;
+  const std::optional<bool> complete = attempt([&] { return find_gaps(placed, gaps); });
   if (!complete.value_or(false)) return std::nullopt;
   return gaps;
 }
@@ -316,6 +324,7 @@ void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
                               shared_.common.thickness, shared_.common.filter, gpu::status().devices.at(0).number);
     shared_.profiler.mark("gpu_start");
   }
+  at_poses_ = false;
   const bool worn = has_tree_ && worn_out_on_device();
   last_boxes_ = boxes;
   if (has_tree_ && !worn) return;
@@ -374,6 +383,11 @@ Positions GpuBackend::on_host(Positions p, int which) {
 }
 
 void GpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
+  if (at_poses_ && placed_search_) {
+    stats.merge(placed_search_->stats());
+    stats["gpu_exact_on_cpu"] = nearest_decided_;
+    return;
+  }
   if (!pipeline_) return;
   stats.merge(pipeline_->stats());
   stats["gpu_exact_on_cpu"] =
@@ -383,8 +397,9 @@ void GpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
 }
 
 void GpuBackend::add_stages(std::map<std::string, double>& stages) const {
-  if (!pipeline_) return;
-  for (const auto& [name, ms] : pipeline_->stages()) stages["gpu/" + name] = ms;
+  const bool by_poses = at_poses_ && placed_search_;
+  if (!by_poses && !pipeline_) return;
+  for (const auto& [name, ms] : by_poses ? placed_search_->stages() : pipeline_->stages()) stages["gpu/" + name] = ms;
 }
 
 // The earliest contact, as in CpuBackend: from near pairs, which stay on the device. If these do not suffice, from all

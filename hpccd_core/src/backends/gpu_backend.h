@@ -15,6 +15,7 @@
 #include "backends/world_positions.h"
 #include "gpu/device.h"
 #include "gpu/pipeline.h"
+#include "gpu/placed_search.h"
 #include "solid/containment.h"
 #include "traverse/mesh_pairs.h"
 #include "traverse/nearest_pairs.h"
@@ -33,6 +34,8 @@ class GpuBackend final : public DetectionBackend {
   // For one world.
   std::optional<WindingNumbers> winding_numbers(Positions vertices, Positions points, std::uint32_t mesh) override;
   std::optional<std::vector<Gap>> distances(Positions vertices) override;
+  // The same for meshes where they are placed now: the same object in every call.
+  std::optional<std::vector<Gap>> distances_at_poses(const PlacedMeshes& placed);
   std::optional<SignedDistances> signed_distances(Positions vertices, Positions points, std::uint32_t mesh) override;
   // As detect, for one world, without points and normals: rows in the memory that the device has written. If there are
   // none after all, they are in `contacts`. Nothing if the device failed.
@@ -132,6 +135,10 @@ class GpuBackend final : public DetectionBackend {
   void prepare_distances();
   // False if the search is left to the CPU: there is nothing to search, or too much.
   bool find_gaps(Positions vertices, std::vector<Gap>& gaps);
+  bool find_gaps(const PlacedMeshes& placed, std::vector<Gap>& gaps);
+  bool can_search() const;
+  std::vector<NearestPair> collect_gaps(const gpu::NearestPairsFound& found, std::vector<Gap>& gaps);
+  void subtract_thickness(std::vector<Gap>& gaps, const std::vector<NearestPair>& nearest) const;
   NearestPair decide_nearest(const gpu::UndecidedNearest& pair, double limit) const;
   void decide_containment(std::vector<Gap>& gaps, const std::vector<gpu::NearestOfMeshes>& nearest, Positions vertices);
   std::optional<MeshPairs> mesh_pairs_;
@@ -140,6 +147,8 @@ class GpuBackend final : public DetectionBackend {
   std::vector<gpu::PairToSearch> pairs_to_search_;
   std::uint64_t version_of_pairs_ = 0;  // that of the thickness
   std::uint64_t nearest_decided_ = 0;   // pairs that the CPU decided
+  std::unique_ptr<gpu::PlacedSearch> placed_search_;
+  bool at_poses_ = false;  // the last query
 };
 
 }  // namespace hpccd

@@ -36,16 +36,49 @@ void GpuBackend::prepare_distances() {
   }
 }
 
+bool GpuBackend::can_search() const {
+  const std::size_t n_all = pairs_to_search_.size() * n_worlds();
+  return shared_.features.n_primitives() > 0 && n_all > 0 && n_all <= most_searched_pairs;
+}
+
 bool GpuBackend::find_gaps(Positions vertices, std::vector<Gap>& gaps) {
   prepare_distances();
-  const std::size_t n_all = pairs_to_search_.size() * n_worlds();
-  if (shared_.features.n_primitives() == 0 || n_all == 0 || n_all > most_searched_pairs) return false;
+  if (!can_search()) return false;
   prepare_snapshot(gpu::Query::nearest, vertices, 0);
   const gpu::NearestPairsFound found =
       pipeline_->find_nearest(vertices, pairs_to_search_, version_of_pairs_, shared_.pool);
   if (!found.good) throw_bad_snapshot(vertices);
   shared_.profiler.mark("gpu");
   if (found.gave_up) return false;
+  const std::vector<NearestPair> nearest = collect_gaps(found, gaps);
+  decide_containment(gaps, found.of_meshes, vertices);
+  subtract_thickness(gaps, nearest);
+  return true;
+}
+
+// The CPU decides containment, as the device's boxes at poses are not the least ones: it computes one vertex of each
+// component, and boxes only where a ray passes.
+bool GpuBackend::find_gaps(const PlacedMeshes& placed, std::vector<Gap>& gaps) {
+  prepare_distances();
+  if (!can_search()) return false;
+  if (!placed_search_) {
+    placed_search_ = gpu::PlacedSearch::create(*shared_.scene, shared_.features, shared_.options, shared_.separations,
+                                               shared_.common.thickness, shared_.common.filter, placed,
+                                               gpu::status().devices.at(0).number);
+    shared_.profiler.mark("gpu_start");
+  }
+  at_poses_ = true;
+  const gpu::NearestPairsFound found = placed_search_->find_nearest(pairs_to_search_, version_of_pairs_);
+  shared_.profiler.mark("gpu");
+  if (found.gave_up) return false;
+  const std::vector<NearestPair> nearest = collect_gaps(found, gaps);
+  containment_->decide(gaps, placed.tree(), placed.snapshot(), &placed, contained_[0], shared_.pool);
+  subtract_thickness(gaps, nearest);
+  return true;
+}
+
+// Decides what only integers can decide. Returns the nearest pairs.
+std::vector<NearestPair> GpuBackend::collect_gaps(const gpu::NearestPairsFound& found, std::vector<Gap>& gaps) {
   const std::size_t n_pairs = mesh_pairs_->size();
   std::vector<NearestPair> nearest(found.of_meshes.size());
   std::vector<const gpu::PairOfFeatures*> features(nearest.size());
@@ -75,12 +108,16 @@ bool GpuBackend::find_gaps(Positions vertices, std::vector<Gap>& gaps) {
     gaps[i] = gap_of((*mesh_pairs_)[i % n_pairs], nearest[i], features[i]->at, geometry);
   }
   shared_.profiler.mark("contacts");
-  decide_containment(gaps, found.of_meshes, vertices);
+  return nearest;
+}
+
+void GpuBackend::subtract_thickness(std::vector<Gap>& gaps, const std::vector<NearestPair>& nearest) const {
+  Separations separations;
+  separations.thickness = shared_.common.thickness.view();
   for (std::size_t i = 0; i < gaps.size(); ++i)
     if (const NearestPair& pair = nearest[i]; gaps[i].kind != GapKind::none)
-      gaps[i].distance -= geometry.separations.thickness_of(pair.kind, pair.first, pair.second);
+      gaps[i].distance -= separations.thickness_of(pair.kind, pair.first, pair.second);
   shared_.profiler.mark("containment");
-  return true;
 }
 
 // As Worker::resolve and DistanceSearch::take.

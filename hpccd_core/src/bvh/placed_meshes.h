@@ -20,33 +20,6 @@ namespace hpccd {
 
 class PlacedMeshes {
  public:
-  // All meshes of the scene have a shape. The arguments must outlive the object.
-  PlacedMeshes(const Scene& scene, const Features& features, ThreadPool& pool);
-
-  // At these poses, by number of mesh. Builds the tree at the first call. False where floats would hardly distinguish
-  // the features of the scene, or coordinates may be too large: the query must be that of the positions.
-  bool place(std::span<const rigid::Pose> poses);
-
-  Tree& tree() { return tree_; }
-  // Positions only of vertices that were fitted; extents contain the meshes, but are not the least ones.
-  const MotionBounds& snapshot() const { return snapshot_; }
-
-  // The position of any vertex, whether or not it is fitted.
-  Vec3<double> position(std::uint32_t vertex) const {
-    const Placed& mesh = meshes_[features_.mesh_of_vertex[vertex]];
-    const double* x = mesh.shape + 3 * std::size_t{vertex - mesh.first_vertex};
-    return mesh.placing({x[0], x[1], x[2]});
-  }
-  // A node with bounds that contain its features at the pose, as of one snapshot (bvh/tree.h).
-  Node at_pose(const Node& node) const;
-
-  // Fits a leaf, or vertices alone. Several threads may do so at a time.
-  void fit(std::uint32_t leaf);
-  void fit_vertices(std::span<const std::uint32_t> vertices);
-
-  std::size_t bytes() const;
-
- private:
   // One mesh: x -> rotation (x - center) + shift takes boxes in its frame to those of the scene, by columns.
   struct Placed {
     rigid::Pose pose;
@@ -62,6 +35,38 @@ class PlacedMeshes {
     Floats4 shift, slanted_shift, margin, slanted_margin;
   };
 
+  // All meshes of the scene have a shape. The arguments must outlive the object.
+  PlacedMeshes(const Scene& scene, const Features& features, ThreadPool& pool);
+
+  // At these poses, by number of mesh. Builds the tree at the first call. False where floats would hardly distinguish
+  // the features of the scene, or coordinates may be too large: the query must be that of the positions.
+  bool place(std::span<const rigid::Pose> poses);
+
+  Tree& tree() { return tree_; }
+  const Tree& tree() const { return tree_; }
+  // Positions only of vertices that were fitted; extents contain the meshes, but are not the least ones.
+  const MotionBounds& snapshot() const { return snapshot_; }
+
+  // The position of any vertex, whether or not it is fitted.
+  Vec3<double> position(std::uint32_t vertex) const {
+    const Placed& mesh = meshes_[features_.mesh_of_vertex[vertex]];
+    const double* x = mesh.shape + 3 * std::size_t{vertex - mesh.first_vertex};
+    return mesh.placing({x[0], x[1], x[2]});
+  }
+  // A node with bounds that contain its features at the pose, as of one snapshot (bvh/tree.h).
+  Node at_pose(const Node& node) const;
+
+  // The data of at_pose() and position(), by mesh and by node: devices have a copy (gpu/placed_search.h).
+  const std::vector<Placed>& meshes() const { return meshes_; }
+  const std::vector<Box>& local_boxes() const { return local_; }
+
+  // Fits a leaf, or vertices alone. Several threads may do so at a time.
+  void fit(std::uint32_t leaf);
+  void fit_vertices(std::span<const std::uint32_t> vertices);
+
+  std::size_t bytes() const;
+
+ private:
   void measure();
   void build_tree();
   void fit_local_boxes();

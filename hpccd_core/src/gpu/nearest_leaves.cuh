@@ -76,8 +76,8 @@ struct SearchedLeaf {
   template <class T>
   __device__ SearchedLeaf(const LaunchParams<T>& params, u32 number, u32 world) : leaf(params.leaves[number]) {
     corner = lane_corner(params, leaf, world);
-    const float4* at = reinterpret_cast<const float4*>(params.points + corner);
-    axes = bound_of(__ldg(at)), slanted = bound_of(__ldg(at + 1));
+    const DevicePoint at = bounds_of_corner(params, corner);
+    axes = at.at[0], slanted = at.at[1];
     axes.tag = corner;
   }
   __device__ bool has_corner() const { return lane_number() < leaf.n_corners(); }
@@ -264,11 +264,10 @@ struct NearestOfLeaves {
   }
 
   __device__ __forceinline__ void search(uint4 pair) {
-    const u32 of = pair.z, world = of / task.n_pairs, first_leaf = world * params.n_leaves;
+    const u32 of = pair.z, world = of / task.n_pairs;
     NearestSoFar& so_far = task.so_far[of];
     const bool same = pair.x == pair.y;
-    const DeviceBox box_a = load_box(&params.leaf_boxes[first_leaf + pair.x]),
-                    box_b = load_box(&params.leaf_boxes[first_leaf + pair.y]);
+    const DeviceBox box_a = box_of_leaf(params, world, pair.x), box_b = box_of_leaf(params, world, pair.y);
     const NodeContent in_a = task.leaf_contents[pair.x], in_b = task.leaf_contents[pair.y];
     const SearchedLeaf a(params, pair.x, world), b(params, pair.y, world);
     const u64 intersecting = fresh_for_warp(&so_far.intersecting);

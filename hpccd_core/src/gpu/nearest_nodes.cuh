@@ -7,10 +7,31 @@
 
 namespace hpccd::gpu {
 
-// The box of a node in one world. The search reads boxes of nodes here only.
+// Of the map of a world's coordinates. sums: a bound on the rounding errors of sums of two coordinates.
+struct WorldScale {
+  double scale, sums;
+};
+
+// The search reads boxes, bounds of corners, positions (nearest_tests.cuh) and the scale of a world with these
+// functions only. Meshes at poses have their own (placed_params.cuh).
 template <class T>
 __device__ inline DeviceBox box_of_node(const LaunchParams<T>& params, u32 world, u32 node) {
   return load_box(&params.node_boxes[static_cast<u64>(world) * params.n_nodes + node]);
+}
+template <class T>
+__device__ inline DeviceBox box_of_leaf(const LaunchParams<T>& params, u32 world, u32 leaf) {
+  return load_box(&params.leaf_boxes[world * params.n_leaves + leaf]);
+}
+// `vertex` is numbered through all worlds.
+template <class T>
+__device__ inline DevicePoint bounds_of_corner(const LaunchParams<T>& params, u32 vertex) {
+  const float4* at = reinterpret_cast<const float4*>(params.points + vertex);
+  return {{bound_of(__ldg(at)), bound_of(__ldg(at + 1))}};
+}
+template <class T>
+__device__ inline WorldScale scale_of_world(const LaunchParams<T>& params, u32 world) {
+  const SceneExtent extent(params.worlds[world]);
+  return {extent.map().scale, 2e-15 * extent.largest()};
 }
 
 __device__ inline float square_of_gap(const DeviceBox& a, const DeviceBox& b) {
@@ -130,12 +151,18 @@ __global__ void begin_nearest_kernel(const __grid_constant__ LaunchParams<T> par
     meshes = task.meshes[of - world * task.n_pairs];
     NearestSoFar& s = task.so_far[of];
     const u64 key = s.key, intersecting = s.intersecting;
-    const SceneExtent extent(params.worlds[world]);
-    const double scale = extent.map().scale;
+    const WorldScale at = scale_of_world(params, world);
     // For a pair as large as the scene, as in traverse/nearest_pairs.cpp.
     constexpr double test_rounding = distance_radius + 1e-14;
-    s = {bits_of(1e307),           bits_of(INFINITY),          no_pair, no_pair, INFINITY, scale,
-         2e-15 * extent.largest(), 14 * test_rounding / scale, 0};
+    s = {bits_of(1e307),
+         bits_of(INFINITY),
+         no_pair,
+         no_pair,
+         INFINITY,
+         at.scale,
+         at.sums,
+         14 * test_rounding / at.scale,
+         0};
     if (meshes.root_a != no_node && meshes.root_b != no_node) begin_with_last(params, task, of, key, intersecting);
   }
   const bool searched = valid && meshes.root_a != no_node && meshes.root_b != no_node;

@@ -4,6 +4,7 @@
 #include "gpu/download.h"
 #include "gpu/memory_on_device.h"
 #include "gpu/pipeline.h"
+#include "gpu/placed_search.h"
 #include "gpu/results_to_device.h"
 
 namespace hpccd::gpu {
@@ -26,6 +27,12 @@ void download(const void*, void*, std::size_t) { throw Error(status().reason); }
 
 std::unique_ptr<Pipeline> Pipeline::create(const Scene&, const Features&, const Options&, const SeparationTable&,
                                            const ThicknessTable&, const FeatureFilter&, int) {
+  throw Error(status().reason);
+}
+
+std::unique_ptr<PlacedSearch> PlacedSearch::create(const Scene&, const Features&, const Options&,
+                                                   const SeparationTable&, const ThicknessTable&, const FeatureFilter&,
+                                                   const PlacedMeshes&, int) {
   throw Error(status().reason);
 }
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rigid motions, bit-identical to hpccd_core/rigid/transform.py; sums are evaluated in its order.
+// Rigid motions, bit-identical to hpccd_core/rigid/transform.py, on GPUs too; sums are evaluated in its order.
 #pragma once
 
 #include <cmath>
 
+#include "base/hd.h"
 #include "base/vec3.h"
 
 namespace hpccd::rigid {
@@ -43,7 +44,7 @@ inline Rotation rotation_of(const Quaternion& q) {
           {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}};
 }
 
-inline Vector rotated(const Rotation& by, const Vector& v) {
+HPCCD_HD Vector rotated(const Rotation& by, const Vector& v) {
   return {v.x * by.first.x + v.y * by.first.y + v.z * by.first.z,
           v.x * by.second.x + v.y * by.second.y + v.z * by.second.z,
           v.x * by.third.x + v.y * by.third.y + v.z * by.third.z};
@@ -66,7 +67,7 @@ class Placing {
         rotation_(rotation_of(pose.turn)),
         shift_(pose.shift) {}
 
-  Vector operator()(const Vector& v) const {
+  HPCCD_HD Vector operator()(const Vector& v) const {
     if (turns_) return rotated(rotation_, v) + shift_;
     return shifts_ ? v + shift_ : v;
   }
