@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "grid_scene.h"
+#include "hpccd/scene.h"
 
 namespace hpccd::test {
 
@@ -93,6 +94,17 @@ inline Body with_isolated_vertices(Body b, std::mt19937& random, std::uint32_t n
   const Body isolated = points(random, n);
   b.positions.insert(b.positions.end(), isolated.positions.begin(), isolated.positions.end());
   return b;
+}
+
+inline Pose random_pose(std::mt19937& random, double reach, bool turned) {
+  std::normal_distribution<double> number;
+  Pose pose;
+  for (double& x : pose.position) x = reach * number(random);
+  if (!turned) return pose;
+  double square = 0;
+  for (double& x : pose.quaternion) x = number(random), square += x * x;
+  for (double& x : pose.quaternion) x /= std::sqrt(square);
+  return pose;
 }
 
 }  // namespace hpccd::test

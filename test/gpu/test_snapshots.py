@@ -171,6 +171,29 @@ def test_the_hybrid_leaves_them_to_the_cpu():
     assert hybrid.backend == "cpu"
 
 
+def test_meshes_at_poses():
+    """The search of the device, and what is left to the CPU: other queries, and scenes with planes."""
+    (ball, ball_faces), (box, box_faces), rng = hc.shapes.icosphere(12), hc.shapes.box(), np.random.default_rng(16)
+    scene = hc.Scene()
+    scene.add_mesh("ball", ball_faces, shape=ball)
+    scene.add_mesh("box", box_faces, shape=0.2 * box)
+    scene.add_mesh("still", ball_faces, shape=ball + [2.2, 0, 0], static=True)
+    cpu, gpu = detectors(scene)
+    for reach in (0.3, 0.3, 3, 1, 0.1):
+        turns = rng.normal(size=(2, 4))
+        poses = np.hstack([reach * rng.normal(size=(2, 3)), turns / np.linalg.norm(turns, axis=1)[:, None]])
+        for _ in range(2):
+            assert gpu.distances(poses=poses) == cpu.distances(poses=poses) == cpu.distances(cpu.positions_at(poses))
+            assert_on_gpu(gpu)
+            assert "node_pairs" not in gpu.stats  # which a search of positions counts
+        assert gpu.intersections(poses=poses).hash == cpu.intersections(poses=poses).hash
+        assert gpu.distances(cpu.positions_at(poses)) == cpu.distances(poses=poses)
+        assert_on_gpu(gpu)
+    scene.add_plane("floor", offset=-3)
+    cpu, gpu = detectors(scene)
+    assert gpu.distances(poses=poses) == cpu.distances(poses=poses)
+
+
 @pytest.mark.parametrize("dtype", (np.float32, np.float64))
 @pytest.mark.parametrize("library", ("cupy", "torch"))
 def test_device_arrays(library, dtype):
