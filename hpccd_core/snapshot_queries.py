@@ -134,7 +134,7 @@ class SnapshotQueries(SnapshotCalls, Generic[ProximityResult, IntersectionsResul
         machine.
 
         Results by poses are bit-identical to those of the positions that :meth:`positions_at` returns, and much faster
-        if every mesh has a shape: only what the search needs is computed, on the CPU.
+        if every mesh has a shape: only what the search needs is computed. With ``backend="gpu"`` the GPU does so.
 
         Examples
         --------
