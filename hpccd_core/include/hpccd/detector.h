@@ -79,11 +79,11 @@ class HPCCD_API Detector {
 
   /// The same queries for meshes with a shape (Scene::set_shape), at poses: bit-identical to those of positions_at. If
   /// all meshes have a shape, a call costs nothing per vertex: nothing is refitted, and only what the search reaches is
-  /// computed, on the CPU. Not so with planes, with several worlds, or where features are below a 100,000th of the
-  /// scene: then the call computes all positions. poses: of the meshes with a shape that are not static, in the order
-  /// added; those of the first world first; none: the identity. others: positions of the meshes without a shape, in
-  /// their order, on the host. Also throws InvalidArgument if the number of poses is another one, if a pose is not
-  /// finite, or if a quaternion is not of length 1 within 1e-3.
+  /// computed, on the CPU, or by distances_at with Backend::gpu on the GPU. Not so with planes, with several worlds, or
+  /// where features are below a 100,000th of the scene: then the call computes all positions. poses: of the meshes with
+  /// a shape that are not static, in the order added; those of the first world first; none: the identity. others:
+  /// positions of the meshes without a shape, in their order, on the host. Also throws InvalidArgument if the number of
+  /// poses is another one, if a pose is not finite, or if a quaternion is not of length 1 within 1e-3.
   Proximity proximity_at(std::span<const Pose> poses, double distance, Positions others = {});
   Intersections intersections_at(std::span<const Pose> poses, Positions others = {});
   std::vector<Gap> distances_at(std::span<const Pose> poses, Positions others = {});
