@@ -157,6 +157,8 @@ class DevicePipeline : public Pipeline {
   template <class T>
   bool run_frame(Positions t0, Positions t1, double distance, ThreadPool& pool);
   template <class T>
+  LaunchParams<T> fit_snapshot(Positions vertices, ThreadPool& pool);
+  template <class T>
   std::optional<std::vector<PointOnFace>> locate_points(Positions vertices, const PointsTask& task, ThreadPool& pool);
   template <class T>
   NearestPairsFound find_nearest(Positions vertices, const std::vector<PairToSearch>& pairs, std::uint64_t version,
@@ -283,10 +285,9 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   return true;
 }
 
+// The tree of a snapshot, and the parameters of what searches it.
 template <class T>
-std::optional<std::vector<PointOnFace>> DevicePipeline::locate_points(Positions vertices, const PointsTask& task,
-                                                                      ThreadPool& pool) {
-  undecided_.clear(), passes_ = 1;
+LaunchParams<T> DevicePipeline::fit_snapshot(Positions vertices, ThreadPool& pool) {
   timer_.begin(stream_);
   const T* given[2];
   positions_.bring(vertices, vertices, given, pool, stream_);
@@ -298,6 +299,14 @@ std::optional<std::vector<PointOnFace>> DevicePipeline::locate_points(Positions 
   timer_.mark("bounds", stream_);
   launch_refit(params);
   timer_.mark("refit", stream_);
+  return params;
+}
+
+template <class T>
+std::optional<std::vector<PointOnFace>> DevicePipeline::locate_points(Positions vertices, const PointsTask& task,
+                                                                      ThreadPool& pool) {
+  undecided_.clear(), passes_ = 1;
+  const LaunchParams<T> params = fit_snapshot<T>(vertices, pool);
   launch_points(params, task, on_stream());
   launch_area(params);
   copy_counters();
@@ -310,17 +319,7 @@ template <class T>
 NearestPairsFound DevicePipeline::find_nearest(Positions vertices, const std::vector<PairToSearch>& pairs,
                                                std::uint64_t version, ThreadPool& pool) {
   undecided_.clear(), passes_ = 0;
-  timer_.begin(stream_);
-  const T* given[2];
-  positions_.bring(vertices, vertices, given, pool, stream_);
-  given_doubles_ = vertices.is_double;
-  LaunchParams<T> params = frame_params(0, given[0], given[1]);
-  timer_.mark("upload", stream_);
-  motion_.begin(params, multiprocessors_, stream_);
-  motion_.launch(query_, params, stream_);
-  timer_.mark("bounds", stream_);
-  launch_refit(params);
-  timer_.mark("refit", stream_);
+  const LaunchParams<T> params = fit_snapshot<T>(vertices, pool);
   launch_area(params);
   for (;;) {
     ++passes_;

@@ -80,9 +80,9 @@ class PlacedSearchOnDevice : public PlacedSearch {
   void upload_shapes(const Scene& scene) {
     shapes_.reserve(std::max<std::size_t>(3 * std::size_t{scene.n_vertices()}, 1));
     for (const Scene::Mesh& mesh : scene.meshes())
-      if (!mesh.shape.empty())
-        check(cudaMemcpy(shapes_.data() + 3 * std::size_t{mesh.first_vertex}, mesh.shape.data(),
-                         mesh.shape.size() * sizeof(double), cudaMemcpyHostToDevice),
+      if (mesh.shape && !mesh.shape->empty())
+        check(cudaMemcpy(shapes_.data() + 3 * std::size_t{mesh.first_vertex}, mesh.shape->data(),
+                         mesh.shape->size() * sizeof(double), cudaMemcpyHostToDevice),
               "cudaMemcpy");
   }
 
