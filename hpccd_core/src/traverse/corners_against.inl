@@ -6,12 +6,12 @@
 
 #include "traverse/leaf_features.inl"
 
-// Features of a leaf, and those corners of it that are vertices of others.
+// Some edges and faces of a leaf.
 struct FeatureBits {
-  std::uint32_t edges, faces, corners;
+  std::uint32_t edges, faces;
 };
 HPCCD_HD FeatureBits operator|(const FeatureBits& a, const FeatureBits& b) {
-  return {a.edges | b.edges, a.faces | b.faces, a.corners | b.corners};
+  return {a.edges | b.edges, a.faces | b.faces};
 }
 
 // The features of a leaf that contain a vertex.
@@ -20,7 +20,7 @@ HPCCD_HD FeatureBits features_at(const LeafFeatures& leaf, std::uint32_t vertex)
   if (leaf.many) same |= equal16(leaf.corners + 16, vertex) << 16;
   same &= first_bits(leaf.n_corners);  // corners of other leaves follow
   const std::uint32_t all = same ? ~0u : 0, at = static_cast<std::uint32_t>(__builtin_ctz(same | 1u << 31)) & all;
-  return {leaf.corners_of->edges_at[at] & all, leaf.corners_of->faces_at[at] & all, same};
+  return {leaf.corners_of->edges_at[at] & all, leaf.corners_of->faces_at[at] & all};
 }
 
 // Two leaves of one mesh are neighbours, of two meshes strangers.
@@ -40,7 +40,7 @@ class CornersAgainst {
       else
         beyond_[i] = Outcodes(b, lanes_b, when.bounds(boxes[i]));
       shared_[i] = leaves == LeafPairOf::neighbours ? features_at(b, a.corners[i])
-                   : leaves == LeafPairOf::same     ? FeatureBits{of_.edges_at[i], of_.faces_at[i], 1u << i}
+                   : leaves == LeafPairOf::same     ? FeatureBits{of_.edges_at[i], of_.faces_at[i]}
                                                     : FeatureBits{};
     });
   }
@@ -57,21 +57,13 @@ class CornersAgainst {
     const std::uint32_t i = of_.edge[0][k], j = of_.edge[1][k];
     return (beyond_[i] & beyond_[j]).faces(b) & ~(shared_[i].faces | shared_[j].faces);
   }
-  HPCCD_HD unsigned vertices_near_face(const LeafFeatures& b, std::uint32_t k) const {
-    return beyond_face(k).vertices(b) & ~shared_with_face(k).corners;
-  }
   HPCCD_HD unsigned edges_near_face(const LeafFeatures& b, std::uint32_t k) const {
-    return beyond_face(k).edges(b) & ~shared_with_face(k).edges;
+    const std::uint32_t i = of_.face[0][k], j = of_.face[1][k], l = of_.face[2][k];
+    return (beyond_[i] & beyond_[j] & beyond_[l]).edges(b) & ~(shared_[i].edges | shared_[j].edges | shared_[l].edges);
   }
 
  private:
   using Outcodes = typename B::Outcodes;
-  HPCCD_HD Outcodes beyond_face(std::uint32_t k) const {
-    return beyond_[of_.face[0][k]] & beyond_[of_.face[1][k]] & beyond_[of_.face[2][k]];
-  }
-  HPCCD_HD FeatureBits shared_with_face(std::uint32_t k) const {
-    return shared_[of_.face[0][k]] | shared_[of_.face[1][k]] | shared_[of_.face[2][k]];
-  }
 
   const CornersOf& of_;
   Outcodes beyond_[CornersOf::most_corners];

@@ -300,15 +300,14 @@ struct Leaves {
       const auto& corner = leaf.corners_of->face;
       return near16<3>({corner[0], corner[1], corner[2]}) & first_bits(leaf.n_faces);
     }
-    HPCCD_HD unsigned vertices(const LeafFeatures& leaf) const { return corners(leaf) & first_bits(leaf.n_vertices); }
-    HPCCD_HD unsigned corners(const LeafFeatures& leaf) const {
+    HPCCD_HD unsigned vertices(const LeafFeatures& leaf) const {
       unsigned m = 0;
       for (std::uint32_t g = 0; g < groups; ++g) {
         Bytes16 beyond = of[0][g];
         if constexpr (When::sets > 1) beyond = beyond | of[1][g];
         m |= zeros(beyond) << (16 * g);
       }
-      return m & first_bits(leaf.n_corners);
+      return m & first_bits(leaf.n_vertices);
     }
   };
 

@@ -41,14 +41,6 @@ HPCCD_HD void vertex_face_pairs(const Against& corners, const LeafFeatures& a, c
   rows.append_to(out.first, out.second, out.n, b.faces, b.n_faces);
 }
 
-template <class Against>
-HPCCD_HD void face_vertex_pairs(const Against& corners, const LeafFeatures& a, const LeafFeatures& b, unsigned faces_a,
-                                unsigned vertices_b, CandidateBuffer& out) {
-  CandidateRows rows;
-  for_each(faces_a, [&](std::uint32_t k) { rows.add(a.faces[k], corners.vertices_near_face(b, k) & vertices_b); });
-  rows.append_to(out.second, out.first, out.n, b.corners, b.n_vertices);
-}
-
 template <class Kernel, class When>
 HPCCD_HD void pairs_within(When when, const LeafFeatures& leaf, TestedFeatures tested, CandidateBuffer& edge_edge,
                            CandidateBuffer& vertex_face) {
@@ -70,19 +62,24 @@ struct NearFeatures {
   }
 };
 
-// Pairs these features of a, one by one, with these of b. Not inlined: copies in each caller increased compile time by
-// half and made no scene faster.
+// Pairs these edges and vertices of a, one by one, with the edges and faces of b, and the vertices of b with the faces
+// of a. Not inlined: copies in each caller increased compile time by half and made no scene faster.
 template <class A, class B, class When>
 [[gnu::noinline]] void near_pairs(When when, const LeafFeatures& a, const LeafFeatures& b,
-                                  const typename B::Lanes& lanes_b, const NearFeatures& of_a, const NearFeatures& of_b,
-                                  bool neighbours, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-  const unsigned edges = of_b.edges ? of_a.edges : 0, faces = of_b.vertices ? of_a.faces : 0,
-                 vertices = of_b.faces ? of_a.vertices : 0;
-  const CornersAgainst<A, B, When> corners(when, a, b, lanes_b, corners_of(a, edges, faces) | vertices,
-                                           neighbours ? LeafPairOf::neighbours : LeafPairOf::strangers);
-  if (edges) edge_pairs(corners, a, b, edges, of_b.edges, edge_edge);
-  if (vertices) vertex_face_pairs(corners, a, b, vertices, of_b.faces, vertex_face);
-  if (faces) face_vertex_pairs(corners, a, b, faces, of_b.vertices, vertex_face);
+                                  const typename A::Lanes& lanes_a, const typename B::Lanes& lanes_b,
+                                  const NearFeatures& of_a, const NearFeatures& of_b, LeafPairOf leaves,
+                                  CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+  const unsigned edges = of_b.edges ? of_a.edges : 0, vertices_a = of_b.faces ? of_a.vertices : 0,
+                 vertices_b = of_a.faces ? of_b.vertices : 0;
+  if (edges || vertices_a) {
+    const CornersAgainst<A, B, When> corners(when, a, b, lanes_b, corners_of(a, edges, 0) | vertices_a, leaves);
+    if (edges) edge_pairs(corners, a, b, edges, of_b.edges, edge_edge);
+    if (vertices_a) vertex_face_pairs(corners, a, b, vertices_a, of_b.faces, vertex_face);
+  }
+  if (vertices_b) {
+    const CornersAgainst<B, A, When> corners(when, b, a, lanes_a, vertices_b, leaves);
+    vertex_face_pairs(corners, b, a, vertices_b, of_a.faces, vertex_face);
+  }
 }
 
 template <class A, class B, class When>
@@ -93,12 +90,12 @@ HPCCD_HD void pairs_between(When when, const LeafFeatures& a, const LeafFeatures
   const typename B::Lanes lanes_b(when, b);
   const NearFeatures of_a(typename A::Outcodes(a, lanes_a, when.bounds(bounds_of(node_b))), a, tested);
   const NearFeatures of_b(typename B::Outcodes(b, lanes_b, when.bounds(bounds_of(node_a))), b, tested);
-  const bool neighbours = node_a.mesh == node_b.mesh;
+  const LeafPairOf leaves = node_a.mesh == node_b.mesh ? LeafPairOf::neighbours : LeafPairOf::strangers;
   // Of the smaller set one by one.
   if (__builtin_popcount(of_a.edges) <= __builtin_popcount(of_b.edges))
-    near_pairs<A, B>(when, a, b, lanes_b, of_a, of_b, neighbours, edge_edge, vertex_face);
+    near_pairs<A, B>(when, a, b, lanes_a, lanes_b, of_a, of_b, leaves, edge_edge, vertex_face);
   else
-    near_pairs<B, A>(when, b, a, lanes_a, of_b, of_a, neighbours, edge_edge, vertex_face);
+    near_pairs<B, A>(when, b, a, lanes_b, lanes_a, of_b, of_a, leaves, edge_edge, vertex_face);
 }
 
 // Boxes of sixteen leaves.
