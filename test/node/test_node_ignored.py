@@ -2,6 +2,7 @@
 """A node that ignores neighbours within a thick mesh: streamed, recorded, and computed again from the file."""
 
 import pytest
+from bag_tools import replayed, rewrite
 from cloth_and_net import FACES, MESHES, frame, positions
 from cloth_and_net_stream import Stream
 from waving_sheet import scene_of
@@ -61,3 +62,13 @@ def test_recorded_and_verified(start_node, tmp_path, from_the_start):
     else:
         assert replay.diverged == found.diverged == 0, (replay.first_divergence, found.first)
         assert any(step.missing and "shape at rest" in step.missing for step in steps)
+        # Without its start a step is not computed; its distances need the shape at rest all the same.
+        changed = tmp_path / "without_start.mcap"
+
+        def without_start(index, message, decoded):
+            return None if "/vertices" in message.topic and index == 0 else decoded
+
+        rewrite(path, changed, without_start)
+        replay, steps = replayed(changed)
+        assert any(step.missing and step.end_frame is not None for step in steps)
+        assert replay.distances.diverged == replay.distances.verified == 0, replay.distances.first
