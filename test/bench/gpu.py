@@ -10,6 +10,7 @@
   device    from the device to the host, on the device, and in a CUDA graph (PyTorch or CuPy)
   large     the same for two nets that collide nearly edge on edge (--sizes)
   distances smallest distances in two frames in turn, also of two large deforming spheres (--spheres)
+  poses     the same of two rigid spheres by poses, new in each call: no positions are uploaded (--spheres)
   worlds    contacts of a folded garment, and near pairs in a folded sheet, many times in one call (--worlds)
 
 Fails if results differ from the CPU's, or if a device left a frame to the CPU.
@@ -33,7 +34,8 @@ from hpccd_ros.bench.sources import Step
 from hpccd_ros.scenes.scene import Mesh
 
 OF_SCENES = ("frames", "threads", "device", "distances")
-PARTS = (*OF_SCENES, "large", "worlds")
+PARTS = (*OF_SCENES, "poses", "large", "worlds")
+GAPS = 0.1, -0.3  # of two spheres; below 0 they intersect
 TIERS = ("balanced", "exact")
 NEAR = 0.35  # of proximity in folded sheets, whose vertices are 1 apart
 FEWEST, SECONDS = 5, 1.0  # rounds of each way: at least FEWEST, and no more once SECONDS have passed
@@ -69,6 +71,14 @@ DISTANCES = {
     "host to host": "host_median_ms",
     "device to host": "median_ms",
     "p95": "p95_ms",
+}
+POSES = {
+    "scene": "scene",
+    "triangles": "triangles",
+    "CPU, ms": "cpu_median_ms",
+    "GPU, ms": "median_ms",
+    "p95": "p95_ms",
+    "first": "first_ms",
 }
 THREADS = {key: key for key in ("scene", "method", "threads", "gpus", "median_ms", "speedup")}
 
@@ -106,8 +116,10 @@ def run(args) -> lab.Report:
         if "distances" in parts:
             _distances(result, args, source.name, source.step(source.n_steps // 2))
     for n in spheres if "distances" in parts else ():
-        for gap in (0.1, -0.3):
+        for gap in GAPS:
             _distances(result, args, f"spheres {n}, {gap:+g}", shapes.two_spheres(n, gap))
+    for n in spheres if "poses" in parts else ():
+        _poses(result, args, n)
     for n in sizes if "large" in parts else ():
         _on_device(result, args, "large", f"nets {n}", shapes.two_nets(n), "exact")
     for count in worlds if "worlds" in parts else ():
@@ -116,6 +128,7 @@ def run(args) -> lab.Report:
         ("ms a call", COLUMNS, ("frames", "device", "large")),
         ("Fig. 6: ms, and times one CPU thread with the published method", THREADS, ("threads",)),
         ("smallest distances, ms a call", DISTANCES, ("distances",)),
+        ("smallest distances by poses, ms a call", POSES, ("poses",)),
         ("many worlds in one call, positions and results on the device", WORLDS, ("worlds",)),
     ):
         if rows := [row for row in result.rows if row["part"] in of]:
@@ -230,6 +243,45 @@ def _distances(result, args, name, step):
         bytes=held,
         stages_ms=_stages(staged, lambda: staged.distances(next(turns))),
     )
+
+
+def _poses(result, args, n, backend="gpu"):
+    """Two rigid spheres that move and turn a little from call to call; one of each kind of detector for all gaps."""
+    scene, triangles = shapes.rigid_spheres(n)
+    options = {"threads": args.threads}
+    detectors = [hc.Detector(scene, backend="cpu", **options)]
+    detectors += [kind(scene, backend=backend, **options) for kind in (hc.Detector, StagesDetector)]
+    for gap in GAPS:
+        name, took, gaps, first_ms = f"rigid spheres {n}, {gap:+g}", [], [], []
+        for detector in detectors:
+            turns = map(shapes.poses_of_spheres, itertools.repeat(gap), itertools.count())
+            began = time.perf_counter()
+            detector.distances(poses=next(turns))
+            first_ms.append(1e3 * (time.perf_counter() - began))
+
+            def ask(of=detector, turns=turns):
+                return of.distances(poses=next(turns))
+
+            if isinstance(detector, StagesDetector):
+                stages = _stages(detector, ask)
+                continue
+            took.append(call_times(ask, args.repeat)[0])
+            last = (shapes.poses_of_spheres(gap, k) for k in range(8))
+            gaps.append([(g.distance, g.kind, g.features, g.inside) for x in last for g in detector.distances(poses=x)])
+            _check(result, name, detector, gaps[-1] == gaps[0])
+        if backend == "gpu" and (detectors[1].backend != "gpu" or "node_pairs" in detectors[1].stats):
+            result.failure(f"{name}: not computed by poses on the GPU")
+        result.add(
+            part="poses",
+            scene=name,
+            triangles=triangles,
+            distance=gaps[0][-1][0],
+            cpu_median_ms=took[0]["median_ms"],
+            **took[1],
+            first_ms=first_ms[1],
+            bytes=detectors[1].stats.get("gpu_bytes"),
+            stages_ms=stages,
+        )
 
 
 class _Step:

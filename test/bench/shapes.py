@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+import hpccd_core as hc
 from hpccd_ros.bench.sources import Step
 from hpccd_ros.scenes.scene import Mesh
 
@@ -68,10 +69,14 @@ def sphere(rings: int, phase: float) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(faces).astype(np.uint32), np.concatenate([xyz.reshape(-1, 3), poles])
 
 
+def _way_between(gap: float) -> np.ndarray:
+    way = np.array([0.8, 0.5, 0.33])
+    return way * ((2 + gap) / np.linalg.norm(way))
+
+
 def two_spheres(rings: int, gap: float) -> Step:
     """Two deforming spheres, each tested against the other only; about `gap` apart, below 0 they intersect."""
-    way = np.array([0.8, 0.5, 0.33])
-    way *= (2 + gap) / np.linalg.norm(way)
+    way = _way_between(gap)
     faces = sphere(rings, 0)[0]
     ends = [
         np.concatenate([sphere(rings, 0.05 * k)[1], sphere(rings, 1 + 0.04 * k)[1] + way]).astype(np.float32)
@@ -81,6 +86,23 @@ def two_spheres(rings: int, gap: float) -> Step:
         Mesh(name, faces, 2 * rings * rings + 2, self_collision=False) for name in ("sphere", "other sphere")
     )
     return Step(meshes, 0, *ends)
+
+
+def rigid_spheres(rings: int) -> tuple[hc.Scene, int]:
+    """Two such spheres that take poses, and their triangles together."""
+    scene = hc.Scene()
+    for phase, name in enumerate(("sphere", "other sphere")):
+        faces, xyz = sphere(rings, phase)
+        scene.add_mesh(name, faces, shape=xyz, self_collision=False)
+    return scene, 2 * len(faces)
+
+
+def poses_of_spheres(gap: float, k: int) -> np.ndarray:
+    """Their poses (2, 7), about `gap` apart, in call k: each turns by a fraction of a degree from call to call."""
+    a, b = 0.003 * k, 0.2 - 0.002 * k
+    here = [0, 0, 0, np.sin(a), 0, 0, np.cos(a)]
+    there = [*_way_between(gap + 1e-4 * (k % 40)), 0, 0.6 * np.sin(b), 0.8 * np.sin(b), np.cos(b)]
+    return np.array([here, there])
 
 
 def garment() -> np.ndarray:

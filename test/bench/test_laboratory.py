@@ -5,6 +5,7 @@ import argparse
 import collections
 import dataclasses
 import sys
+import types
 
 import numpy as np
 import oracle
@@ -12,7 +13,7 @@ import pytest
 from oracle import rigid_results
 
 import hpccd_core as hc
-from bench import distance, inside, page, rigid, step, stop
+from bench import distance, gpu, inside, page, rigid, step, stop
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command, measure, sources
 from hpccd_ros.bench.sources import of_scene
@@ -290,15 +291,23 @@ def test_a_peer_beside_it(bench):
         assert status == 0 and any(row.get("times_faster_than_ipctk", 0) > 0 for row in result["rows"])
 
 
+def test_distances_by_poses_without_a_gpu():
+    rows, failures = [], []
+    result = types.SimpleNamespace(add=lambda **row: rows.append(row), failure=failures.append)
+    gpu._poses(result, argparse.Namespace(repeat=2, threads=1), 6, backend="cpu")
+    assert failures == [] and [row["triangles"] for row in rows] == [288, 288]
+    assert rows[0]["distance"] > 0 == rows[1]["distance"] and all(row["median_ms"] > 0 for row in rows)
+
+
 @pytest.mark.skipif("gpu" not in hc.backends(), reason="no usable GPU")
 def test_gpu(bench):
     few = ("folding-strip", "--size", "0.1", "--repeat", "5", "--sizes", "12", "--worlds", "1,3", "--threads", "2")
     status, result, _ = bench("gpu", *few, "--parts", "frames,threads")
     assert status == 0 and result["failures"] == [] and {r["part"] for r in result["rows"]} == {"frames", "threads"}
     pytest.importorskip("torch", reason="PyTorch is not installed: positions on the device are not measured")
-    status, result, _ = bench("gpu", *few, "--spheres", "6", "--parts", "device,distances,large,worlds")
+    status, result, _ = bench("gpu", *few, "--spheres", "6", "--parts", "device,distances,poses,large,worlds")
     assert status == 0 and result["failures"] == []
-    assert sum(row["part"] == "distances" for row in result["rows"]) == 3
+    assert [sum(row["part"] == part for row in result["rows"]) for part in ("distances", "poses")] == [3, 2]
     detect = [row for row in result["rows"] if row.get("query") == "detect"]
     assert [row["worlds"] for row in detect] == [1, 3] and min(row["pairs"] for row in detect) > 0
 
