@@ -27,9 +27,9 @@ class SnapshotCalls:
     _has_shapes: bool
 
     def _ask(self, query: str, vertices: object, stream: object, *more: object, poses: object = None) -> Any:
+        made_on = device_arrays.stream_number(stream)
         if poses is not None or vertices is None:
             return self._ask_at(query, vertices, poses, *more)
-        made_on = device_arrays.stream_number(stream)
         ask = getattr(self._core, query)
         if device_arrays.is_on_device(vertices):
             place = device_arrays.positions("vertices", vertices, self._shape, made_on)

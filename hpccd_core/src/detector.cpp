@@ -11,9 +11,12 @@
 
 #include "backends/available.h"
 #include "backends/tuner.h"
+#include "backends/world_positions.h"
+#include "base/coordinate_limits.h"
 #include "base/length.h"
 #include "base/one_call.h"
 #include "base/standard_arithmetic.h"
+#include "bvh/bad_coordinate.h"
 #include "checked.h"
 #include "contacts/intersections.h"
 #include "contacts/outputs.h"
@@ -625,7 +628,18 @@ std::vector<Gap> Detector::distances_at(std::span<const Pose> poses, Positions o
 
 std::vector<double> Detector::positions_at(std::span<const Pose> poses, Positions others) {
   const StandardArithmetic arithmetic;
-  return impl_->positions_at(impl_->checked_poses(poses, others), others);
+  std::vector<double> all = impl_->positions_at(impl_->checked_poses(poses, others), others);
+  const auto bad = std::ranges::find_if(all, [](double x) { return !acceptable(x, largest_in_snapshot); });
+  if (bad == all.end()) return all;
+  // The same error as that of a query of these positions.
+  const std::size_t rows = all.size() / 3 / impl_->options().worlds;
+  const std::size_t world = static_cast<std::size_t>(bad - all.begin()) / (3 * rows);
+  try {
+    report_bad("vertices", all.data() + 3 * rows * world, rows, largest_in_snapshot);
+  } catch (const InvalidArgument& error) {
+    if (impl_->options().worlds == 1) throw;
+    throw InvalidArgument(with_world(error.what(), world));
+  }
 }
 
 double Detector::separating_translation(Positions vertices, std::uint32_t mesh_a, std::uint32_t mesh_b,

@@ -145,6 +145,10 @@ def test_shapes_of_huge_coordinates():
     assert gaps_as_bits(by_poses.distances(poses=poses)) == gaps_as_bits(by_positions.distances(positions))
     with pytest.raises(ValueError, match=r"vertices\["):
         by_poses.distances(poses=[[1e301, 0, 0, 0, 0, 0, 1], poses[1]])
+    with pytest.raises(ValueError, match=r"^vertices\[0, 0\] is .*, beyond 1e\+300"):
+        by_poses.positions_at([[1e301, 0, 0, 0, 0, 0, 1], poses[1]])
+    with pytest.raises(ValueError, match=r"^vertices\[1, 0, 0\] is "):
+        hc.Detector(shapes.scene, worlds=2).positions_at([poses, [[1e301, 0, 0, 0, 0, 0, 1], poses[1]]])
     assert by_poses.distances(poses=poses)[0].distance > 0
 
 
@@ -288,5 +292,7 @@ def test_positions_and_poses_are_not_mixed_up():
         hc.Detector(plain).proximity(SHEET)
     with pytest.raises(ValueError, match="distance: must be finite"):
         hc.Detector(plain).proximity(SHEET, math.nan)
+    with pytest.raises(TypeError, match="stream: expected a cudaStream_t"):
+        hc.Detector(Shapes([(BALL, BALL_FACES)]).scene).distances(poses=pose, stream="x")
     with pytest.raises(ValueError, match="not offered with detail"):
         hc.Detector(Shapes([(BALL, BALL_FACES)]).scene, detail=0.5).distances(poses=pose)
