@@ -14,6 +14,7 @@ from ._installations import warn_of_several as _warn_of_several
 from .contacts import Contacts
 from .contours import Contour, EnclosedRegion
 from .detector import Detector
+from .device_distances import DeviceDistances
 from .device_results import DeviceContacts, DeviceIntersections, DeviceProximity
 from .devices import backends, gpu_status
 from .elementary import test_edge_edge, test_vertex_face
@@ -36,6 +37,7 @@ __all__ = [
     "Detector",
     "DeviceArray",
     "DeviceContacts",
+    "DeviceDistances",
     "DeviceIntersections",
     "DeviceProximity",
     "EnclosedRegion",

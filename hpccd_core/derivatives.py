@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .contacts import Contacts
 from .detector import Detector
+from .device_distances import DeviceDistances
 from .options import Output
 from .proximity import Gap, Proximity
 
@@ -85,7 +86,8 @@ def proximity(detector: Any, positions: object, distance: float) -> tuple[Proxim
 def smallest_distances(detector: Any, positions: object) -> tuple[Any, Linearization]:
     """What `Detector.distances` returns, and its distances, world by world."""
     found = detector.distances(positions)
-    worlds: list[list[Gap]] = [found] if detector.worlds is None else found
+    on_host: Any = found.to_host() if isinstance(found, DeviceDistances) else found
+    worlds: list[list[Gap]] = [on_host] if detector.worlds is None else on_host
     gaps = [(k, gap) for k, of_world in enumerate(worlds) for gap in of_world]
     vertices, gradient = np.zeros((len(gaps), 4), np.int64), np.zeros((len(gaps), 4, 3))
     for row, (k, gap) in enumerate(gaps):

@@ -17,6 +17,7 @@ from . import _core, arguments, detail_options, device_arrays
 from .array_types import ArrayLike, Detail, MeshName, Positions, Stream
 from .contacts import Contacts
 from .detail_core import DetailedCore
+from .device_distances import DeviceDistances
 from .device_results import DeviceContacts, DeviceIntersections, DeviceProximity
 from .devices import backends, gpu_status
 from .mesh_layout import Indices
@@ -172,7 +173,7 @@ class Detector(
 
     @overload
     def __init__(
-        self: Detector[DeviceContacts, float, DeviceProximity, DeviceIntersections, list[Gap]],
+        self: Detector[DeviceContacts, float, DeviceProximity, DeviceIntersections, DeviceDistances],
         scene: Scene,
         *,
         results: Literal["device"],
@@ -182,7 +183,7 @@ class Detector(
 
     @overload
     def __init__(
-        self: Detector[DeviceContacts, NDArray[np.float64], DeviceProximity, DeviceIntersections, list[list[Gap]]],
+        self: Detector[DeviceContacts, NDArray[np.float64], DeviceProximity, DeviceIntersections, DeviceDistances],
         scene: Scene,
         *,
         results: Literal["device"],

@@ -24,13 +24,8 @@ def _floats_on_device(numbers: list[float], device: int) -> DeviceArray:
     return integers_on_device(np.array(numbers, np.float64).view(np.int64).tolist(), device).seen_as("f")
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class _OnDevice:
-    """Fields that all of them share. slices: with worlds, by name as in worlds.Slices."""
-
-    hash: int
-    slices: dict[str, DeviceArray | None] | None = dataclasses.field(repr=False)
-    layout: MeshLayout | None = dataclasses.field(repr=False)
+class ComparedOnHost:
+    """Base of results on a device."""
 
     def to_host(self) -> Any:
         """A copy in numpy arrays."""
@@ -42,6 +37,15 @@ class _OnDevice:
         return self is other or bool(self.to_host() == other.to_host())
 
     __hash__ = None  # type: ignore[assignment]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _OnDevice(ComparedOnHost):
+    """Fields that results with rows share. slices: with worlds, by name as in worlds.Slices."""
+
+    hash: int
+    slices: dict[str, DeviceArray | None] | None = dataclasses.field(repr=False)
+    layout: MeshLayout | None = dataclasses.field(repr=False)
 
     def _offsets(self, kind: str, rows: DeviceArray) -> DeviceArray:
         if self.slices is None:

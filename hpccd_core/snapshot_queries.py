@@ -9,7 +9,7 @@ from typing import Generic, NoReturn, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from . import arguments, device_results
+from . import arguments, device_distances, device_results
 from .array_types import ArrayLike, Positions, Stream
 from .core_calls import SnapshotCalls
 from .mesh_layout import Indices
@@ -124,8 +124,9 @@ class SnapshotQueries(SnapshotCalls, Generic[ProximityResult, IntersectionsResul
 
         Returns
         -------
-        list of Gap, or list of W such lists with worlds
-            A Gap for each pair, in the order in which the meshes were added: (0, 0), (0, 1), ...
+        list of Gap, list of W such lists with worlds, or DeviceDistances
+            A Gap for each pair, in the order in which the meshes were added: (0, 0), (0, 1), ... With results="device"
+            arrays with a row for each pair.
 
         Notes
         -----
@@ -151,6 +152,9 @@ class SnapshotQueries(SnapshotCalls, Generic[ProximityResult, IntersectionsResul
         if unnamed:
             arguments.reject_unnamed("distances", _ONE_FRAME)
         names = self._layout.mesh_names
+        if self.results == "device":
+            found = self._ask("distance_arrays", vertices, stream, poses=poses)
+            return cast(DistancesResult, device_distances.distances_of(found, self.worlds, names))
         gaps = [
             Gap(names[a], names[b], distance, kind, tuple(features), *others)
             for a, b, distance, kind, features, *others in self._ask("distances", vertices, stream, poses=poses)

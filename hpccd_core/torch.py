@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 from . import derivatives
 from .contacts import Contacts
 from .detector import Detector
+from .device_distances import DeviceDistances
 from .proximity import Gap, Proximity
 
 try:
@@ -205,7 +206,7 @@ def proximity_distances(
 
 def smallest_distances(
     detector: _AnyDetector, vertices: torch.Tensor
-) -> tuple[torch.Tensor, list[Gap] | list[list[Gap]]]:
+) -> tuple[torch.Tensor, list[Gap] | list[list[Gap]] | DeviceDistances]:
     """The smallest distance of each pair of meshes.
 
     Parameters
@@ -217,7 +218,7 @@ def smallest_distances(
     -------
     distances : torch.Tensor, shape (P,) or (W, P), float64
         In the order of `gaps`; 0 where meshes intersect, +inf where no pair of features exists.
-    gaps : list of Gap, or list of W such lists with worlds
+    gaps : list of Gap, list of W such lists with worlds, or DeviceDistances
         What :meth:`Detector.distances` returns.
 
     Raises

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ._core import DeviceArray
 from .contacts import Contacts
+from .device_distances import DeviceDistances
 from .device_results import DeviceContacts, DeviceIntersections, DeviceProximity
 from .proximity import Intersections, Proximity
 from .scene import Scene
@@ -30,7 +31,9 @@ except ModuleNotFoundError as error:
 #: The mesh of a scene that holds the particles of a model.
 PARTICLES = "particles"
 
-_Result = Contacts | Proximity | Intersections | DeviceContacts | DeviceProximity | DeviceIntersections
+_Result = (
+    Contacts | Proximity | Intersections | DeviceContacts | DeviceProximity | DeviceIntersections | DeviceDistances
+)
 
 
 def scene_of(model: Any, *, self_collision: bool = True) -> Scene:
@@ -157,8 +160,9 @@ def arrays(result: _Result) -> dict[str, Any]:
 
     Parameters
     ----------
-    result : Contacts, Proximity or Intersections, or DeviceContacts, DeviceProximity or DeviceIntersections
-        The result of :meth:`Detector.detect`, :meth:`Detector.proximity` or :meth:`Detector.intersections`.
+    result : Contacts, Proximity or Intersections, or one whose name begins with Device
+        The result of :meth:`Detector.detect`, :meth:`Detector.proximity` or :meth:`Detector.intersections`, or that of
+        :meth:`Detector.distances` on the device.
 
     Returns
     -------
@@ -176,7 +180,7 @@ def arrays(result: _Result) -> dict[str, Any]:
         raise TypeError(f"result: expected that of detect, proximity or intersections, got {type(result).__name__}")
     found = {field.name: getattr(result, field.name) for field in dataclasses.fields(result)}
     found |= getattr(result, "outputs", {})
-    if result.slices is not None:
+    if getattr(result, "slices", None) is not None:
         kinds = [kind for kind in ("vf", "ee", "ef") if len(found.get(kind, ()))]
         found |= {f"{kind}_offsets": getattr(result, f"{kind}_offsets") for kind in kinds}
     return {name: _shared(a) for name, a in found.items() if isinstance(a, np.ndarray | DeviceArray)}

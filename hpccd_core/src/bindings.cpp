@@ -281,6 +281,14 @@ py::dict rows_where_asked(const Detector& d, OnDevice&& on_device, OnHost&& on_h
   return d.options().results_on_device ? to_dict(unlocked(on_device), d.options().worlds) : to_dict(unlocked(on_host));
 }
 
+// Distances as arrays, where the detector leaves its results.
+template <class Query>
+py::dict arrays_of_gaps(const Detector& d, Query&& query) {
+  std::optional<int> device;
+  if (d.options().results_on_device) device = gpu::status().devices.at(0).number;
+  return to_dict(unlocked(query), d.options().worlds, device);
+}
+
 // For queries that take less time than reacquiring the interpreter lock, which may take a whole time slice of another
 // thread.
 template <class Query>
@@ -537,6 +545,12 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
           },
           "vertices"_a)
       .def(
+          "distance_arrays",
+          [](Detector& d, const GivenPositions& vertices) {
+            return arrays_of_gaps(d, [&] { return d.distances(vertices.positions); });
+          },
+          "vertices"_a)
+      .def(
           "proximity_at",
           [](Detector& d, const Array<double>& poses, const GivenPositions& others, double distance) {
             return to_dict(unlocked([&] { return d.proximity_at(poses_of(poses), distance, others.positions); }));
@@ -552,6 +566,12 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
           "distances_at",
           [](Detector& d, const Array<double>& poses, const GivenPositions& others) {
             return to_list(unlocked([&] { return d.distances_at(poses_of(poses), others.positions); }));
+          },
+          "poses"_a, "others"_a)
+      .def(
+          "distance_arrays_at",
+          [](Detector& d, const Array<double>& poses, const GivenPositions& others) {
+            return arrays_of_gaps(d, [&] { return d.distances_at(poses_of(poses), others.positions); });
           },
           "poses"_a, "others"_a)
       .def(

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "contacts/gap_fields.h"
 #include "gpu/download.h"
 #include "gpu/results_to_device.h"
 
@@ -101,6 +102,14 @@ DeviceArray rows_of(const DeviceArray& a, std::int64_t begin, std::int64_t end) 
   return part;
 }
 
+// Row k, without a copy and without the first axis.
+DeviceArray row_of(const DeviceArray& a, std::int64_t k) {
+  if (k < 0) throw py::index_error("row: out of range");
+  DeviceArray row = rows_of(a, k, k + 1);
+  row.shape.erase(row.shape.begin());
+  return row;
+}
+
 // Allocation and copies may wait for the device: other Python threads continue meanwhile.
 std::shared_ptr<const void> copied_there(const void* a, std::size_t a_bytes, const void* b, std::size_t b_bytes,
                                          int device) {
@@ -152,7 +161,7 @@ Attributes
 ----------
 shape : tuple of int
 dtype : numpy.dtype
-    uint32, int64, uint64 or float64.
+    int32, uint32, int64, uint64 or float64.
 device : int
     Number of the GPU in CUDA.
 
@@ -211,6 +220,22 @@ Raises
 ------
 IndexError
     If the rows are out of range.
+)")
+      .def("row", &row_of, py::arg("k"), R"(Row k, in place, without the first axis.
+
+Parameters
+----------
+k : int
+    0 <= k < len(self).
+
+Returns
+-------
+DeviceArray
+
+Raises
+------
+IndexError
+    If there is no such row.
 )")
       .def(
           "seen_as", [](DeviceArray a, char kind) { return a.kind = kind, a; }, py::arg("kind"),
@@ -295,6 +320,34 @@ py::dict to_dict(const DeviceResults& r, std::uint32_t n_worlds) {
                          py::arg("ef") = of_worlds(r.ef_offsets, 'i', worlds + 1),
                          py::arg("hashes") = of_worlds(r.hashes, 'u', worlds),
                          py::arg("first_tocs") = of_worlds(r.first_tocs, 'f', worlds));
+  return d;
+}
+
+py::dict to_dict(const std::vector<Gap>& gaps, std::uint32_t n_worlds, std::optional<int> device) {
+  std::shared_ptr<const GapFields> packed;
+  std::shared_ptr<const void> there;
+  {
+    py::gil_scoped_release release;
+    packed = std::make_shared<const GapFields>(gaps);
+    if (device) there = gpu::joined_on_device(packed->block().data(), packed->block().size(), nullptr, 0, *device);
+  }
+  const auto* begin = static_cast<const unsigned char*>(device ? there.get() : packed->block().data());
+  const std::size_t n_pairs = gaps.size() / n_worlds;
+  py::dict d;
+  for (const GapFields::Field& f : packed->fields()) {
+    DeviceArray a{there,  begin + f.begin, {n_worlds, static_cast<std::int64_t>(n_pairs)}, f.kind, f.item_bytes,
+                  device.value_or(-1)};
+    a.shape.insert(a.shape.end(), f.row.begin(), f.row.end());
+    if (device) {
+      d[f.name] = a;
+      continue;
+    }
+    const py::capsule owner(new auto(packed), [](void* p) { delete static_cast<std::shared_ptr<const GapFields>*>(p); });
+    d[f.name] = py::array(py::dtype(a.type()), std::vector<py::ssize_t>(a.shape.begin(), a.shape.end()), a.data, owner);
+  }
+  py::list pairs;
+  for (std::size_t i = 0; i < n_pairs; ++i) pairs.append(py::make_tuple(gaps[i].mesh_a, gaps[i].mesh_b));
+  d["pairs"] = pairs;
   return d;
 }
 

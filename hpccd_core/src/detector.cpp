@@ -370,7 +370,7 @@ struct Detector::Impl {
   auto at_poses(std::span<const Pose> poses, Positions others, Placed&& placed, Given&& given) {
     const std::vector<rigid::Pose> of_meshes = checked_poses(poses, others);
     using Answer = decltype(given(others));
-    if (options().worlds == 1 && !options().results_on_device && !common.planes.any() && all_have_shapes()) {
+    if (options().worlds == 1 && !common.planes.any() && all_have_shapes()) {
       std::optional<Answer> answer = call([&]() -> std::optional<Answer> {
         CpuBackend& cpu = backends().cpu();
         if (!cpu.place(of_meshes)) return std::nullopt;

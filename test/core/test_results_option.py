@@ -204,7 +204,8 @@ def test_arrays_on_a_device_still_need_one(meshes):
 
 
 def test_names_are_found_where_they_are_promised():
-    for name in ("Contacts", "Detector", "DeviceArray", "DeviceContacts", "DeviceIntersections", "DeviceProximity"):
+    on_device = ("DeviceArray", "DeviceContacts", "DeviceDistances", "DeviceIntersections", "DeviceProximity")
+    for name in ("Contacts", "Detector", *on_device):
         assert name in hc.__all__ and hasattr(hc, name)
     for name in hc.__all__:
         assert hasattr(hc, name)

@@ -40,6 +40,7 @@ gaps: list[list[hc.Gap]] = many.distances(np.zeros((3, 3, 3)))
 steps: NDArray[np.float64] = many.collision_free_step(np.zeros((3, 3, 3)), np.ones((3, 3, 3)))
 neither: list[hc.Gap] = many.distances(np.zeros((3, 3, 3)))  # line 24
 device_step: float = hc.Detector(scene, results="device").collision_free_step(np.zeros((3, 3)), np.ones((3, 3)))
+device_gaps: hc.DeviceDistances = hc.Detector(scene, results="device").distances(np.zeros((3, 3)))
 
 
 def as_asked(worlds: int | None) -> None:
