@@ -31,8 +31,8 @@ _FEATURES: dict[Kind, int] = {
 class DeviceDistances(ComparedOnHost):
     """Smallest distances in a GPU's memory: a row for each of P pairs of meshes, with the fields of :class:`Gap`.
 
-    :meth:`Detector.distances` returns it if the detector has results="device". Numbers are those of :class:`Gap`, bit
-    for bit; what a :class:`Gap` leaves out is 0. With W worlds all shapes begin with W: `distance` is (W, P). All
+    :meth:`Detector.distances` returns it if the detector has results="device". Numbers are bit-identical to those of
+    :class:`Gap`; what a :class:`Gap` leaves out is 0. With W worlds all shapes begin with W: `distance` is (W, P). All
     arrays are in one allocation, which is released after all of them are.
 
     Attributes
@@ -100,8 +100,8 @@ class DeviceDistances(ComparedOnHost):
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "pairs"}
 
     def __repr__(self) -> str:
-        worlds = "" if self._worlds is None else f" in {self._worlds} worlds"
-        return f"DeviceDistances({len(self.pairs)} pairs of meshes{worlds})"
+        pairs = f"{len(self.pairs)} pair{'' if len(self.pairs) == 1 else 's'} of meshes"
+        return f"DeviceDistances({pairs}{'' if self._worlds is None else f' in {self._worlds} worlds'})"
 
 
 def _gaps(pairs: Sequence[tuple[str, str]], arrays: dict[str, NDArray[Any]]) -> list[Gap]:

@@ -125,8 +125,7 @@ class SnapshotQueries(SnapshotCalls, Generic[ProximityResult, IntersectionsResul
         Returns
         -------
         list of Gap, list of W such lists with worlds, or DeviceDistances
-            A Gap for each pair, in the order in which the meshes were added: (0, 0), (0, 1), ... With results="device"
-            arrays with a row for each pair.
+            A Gap, or a row, for each pair, in the order in which the meshes were added: (0, 0), (0, 1), ...
 
         Notes
         -----

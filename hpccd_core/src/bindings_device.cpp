@@ -335,14 +335,15 @@ py::dict to_dict(const std::vector<Gap>& gaps, std::uint32_t n_worlds, std::opti
   const std::size_t n_pairs = gaps.size() / n_worlds;
   py::dict d;
   for (const GapFields::Field& f : packed->fields()) {
-    DeviceArray a{there,  begin + f.begin, {n_worlds, static_cast<std::int64_t>(n_pairs)}, f.kind, f.item_bytes,
-                  device.value_or(-1)};
+    DeviceArray a{there,  begin + f.begin, {n_worlds, static_cast<std::int64_t>(n_pairs)},
+                  f.kind, f.item_bytes,    device.value_or(-1)};
     a.shape.insert(a.shape.end(), f.row.begin(), f.row.end());
     if (device) {
       d[f.name] = a;
       continue;
     }
-    const py::capsule owner(new auto(packed), [](void* p) { delete static_cast<std::shared_ptr<const GapFields>*>(p); });
+    const py::capsule owner(new auto(packed),
+                            [](void* p) { delete static_cast<std::shared_ptr<const GapFields>*>(p); });
     d[f.name] = py::array(py::dtype(a.type()), std::vector<py::ssize_t>(a.shape.begin(), a.shape.end()), a.data, owner);
   }
   py::list pairs;

@@ -85,7 +85,7 @@ def test_streams_of_torch_and_the_default_ones():
     assert_same(detector.proximity(ends[0], 0.2, stream=stream), cpu.proximity(t0, 0.2))
     assert_same(detector.intersections(ends[1], stream=stream), cpu.intersections(t1))
     assert detector.collision_free_step(*ends, stream=stream) == cpu.collision_free_step(t0, t1)
-    assert detector.distances(ends[0], stream=stream)[0].distance == cpu.distances(t0)[0].distance
+    assert detector.distances(ends[0], stream=stream).to_host() == cpu.distances(t0)
     assert_on_gpu(detector)
 
 
