@@ -6,11 +6,15 @@
 
 All ms are for all worlds. "one call": on all threads; "1 thread": on one. "one detector": one call per world. "a
 detector each": one detector per world (at most 1,024, because they need memory). "of all threads": core time of the one
-detector divided by that of one call times its threads; 1 if each thread is as fast as on its own. Contacts of each
-world are compared in the last round.
+detector divided by that of one call times its threads; 1 if each thread is as fast as on its own. "of the machine": the
+same with as many such detectors at once as threads, each with its share of the worlds: they do not wait for each other,
+but share caches and memory. Contacts of each world are compared in the last round.
 """
 
 from __future__ import annotations
+
+import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -26,6 +30,7 @@ COLUMNS = {
     "worlds": "worlds",
     "one call, ms": "one_call_ms",
     "of all threads": "of_all_threads",
+    "of the machine": "of_the_machine",
     "1 thread, ms": "one_thread_ms",
     "one detector": "one_detector_ms",
     "a detector each": "detectors_ms",
@@ -68,19 +73,24 @@ def _measure(result, name, steps, worlds, args):
     )
     scene, tier = steps[0].scene(), {"accuracy": args.accuracy, "backend": "cpu"}
     threads = args.threads or lab.cores()
-    one = hc.Detector(scene, threads=1, **tier)
+    alone = [hc.Detector(scene, threads=1, **tier) for _ in range(min(threads, worlds))]
+    one, all_begin = alone[0], threading.Barrier(len(alone))
     each = [hc.Detector(scene, threads=1, **tier) for _ in range(worlds if worlds <= MOST_DETECTORS else 0)]
     call, call_of_one = (hc.Detector(scene, worlds=worlds, threads=n, **tier) for n in (threads, 1))
 
     def in_turn(detectors):
         return [detector.detect(a, b) for detector, a, b in zip(detectors, start, end, strict=True)]
 
-    def core_ms_of_one():
+    def core_ms(detector, share):
         total = 0.0
-        for a, b in zip(start, end, strict=True):
-            one.detect(a, b)
-            total += one.profile["total"]
+        for a, b in zip(start[share], end[share], strict=True):
+            detector.detect(a, b)
+            total += detector.profile["total"]
         return total
+
+    def core_ms_of(number):
+        all_begin.wait()
+        return core_ms(alone[number], slice(number, None, len(alone)))
 
     ways = {
         "one_call": lambda: call.detect(start, end),
@@ -89,11 +99,13 @@ def _measure(result, name, steps, worlds, args):
         **({"detectors": lambda: in_turn(each)} if each else {}),
     }
     ms, found = lab.in_turn(f"{name}, {worlds} worlds", ways, args.repeat)
-    core = {"one_call": [], "one_detector": []}
-    for _ in range(args.repeat):
-        call.detect(start, end)
-        core["one_call"].append(call.profile["total"])
-        core["one_detector"].append(core_ms_of_one())
+    core = {"one_call": [], "one_detector": [], "at_once": []}
+    with ThreadPoolExecutor(len(alone)) as pool:
+        for _ in range(args.repeat):
+            call.detect(start, end)
+            core["one_call"].append(call.profile["total"])
+            core["one_detector"].append(core_ms(one, slice(None)))
+            core["at_once"].append(sum(pool.map(core_ms_of, range(len(alone)))))
     core = {way: lab.times(of_way)["median_ms"] for way, of_way in core.items()}
     _compare(result, f"{name}, {worlds} worlds", found, worlds)
     return {
@@ -105,6 +117,7 @@ def _measure(result, name, steps, worlds, args):
         "contacts": len(found["one_call"]),
         **{f"{way}_ms": lab.times(of_way)["median_ms"] for way, of_way in ms.items()},
         "of_all_threads": core["one_detector"] / core["one_call"] / threads,
+        "of_the_machine": core["at_once"] / core["one_call"] / threads,
         "bytes_a_world": call.stats["bytes"] / worlds,
     }
 
