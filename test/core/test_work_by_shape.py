@@ -64,6 +64,25 @@ def test_what_lies_far_away_adds_no_work(query, where):
     assert 0 < max(distant) < 3 * near
 
 
+@pytest.mark.parametrize("backend", [name for name in ("cpu", "gpu") if name in hc.backends()])
+@pytest.mark.parametrize("size", [1, 0.3])
+@pytest.mark.parametrize("query", QUERIES)
+def test_a_mesh_that_was_torn_apart_adds_no_work_once_it_is_whole(query, size, backend):
+    """A tree of that moment would keep together what is far apart later. The device knows this one call later."""
+    scene, random = hc.Scene(), np.random.default_rng(0)
+    faces, x = sheet(30)
+    for name in ("large", "torn"):
+        scene.add_mesh(name, faces, self_collision=name == "torn")
+    whole = np.concatenate([x + [0, 0, 0.5], size * x])
+    torn = np.concatenate([x + [0, 0, 0.5], size * random.uniform(-1, 1, x.shape)])
+    separation = 1e-3 if query == "separation" else 0.0
+    ago, new = (hc.Detector(scene, threads=1, backend=backend, minimum_separation=separation) for _ in range(2))
+    ask(query, ago, torn)
+    if backend == "gpu":
+        ask(query, ago, whole)
+    assert ask(query, ago, whole) < 1.5 * ask(query, new, whole)
+
+
 def bars(direction, m):
     """Vertices of m * m parallel bars beside each other, 0.05 apart."""
     along = np.array(direction, float)

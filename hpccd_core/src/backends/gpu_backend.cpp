@@ -334,15 +334,18 @@ void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
   near_.edge = typical_length(shared_.features, shared_.tree.motion().vertices);
   pipeline_->set_tree(shared_.tree.tree());
   area_when_built_.clear();  // known once the device has refitted the tree
+  looseness_when_built_ = shared_.tree.tree().wear_when_built.looseness;
   has_tree_ = true;
   shared_.profiler.mark("build");
 }
 
-// Compares the last frame with the first one whose boxes were of the same kind.
+// Compares the last frame with the first one whose boxes were of the same kind, which may be later than the build:
+// looseness does not depend on their kind.
 bool GpuBackend::worn_out_on_device() {
-  const double area = pipeline_->relative_area();
-  if (!(area > 0)) return false;  // the frame was rejected
-  return worn_out(area, area_when_built_.try_emplace(last_boxes_, area).first->second);
+  const Wear wear = pipeline_->wear();
+  if (!(wear.area > 0)) return false;
+  const double area_when_built = area_when_built_.try_emplace(last_boxes_, wear.area).first->second;
+  return worn_out(wear, {area_when_built, looseness_when_built_});
 }
 
 // Pairs that neither the device nor its error bounds could decide: decide(pair) returns its time or distance, or

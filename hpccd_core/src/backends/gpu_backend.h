@@ -125,6 +125,7 @@ class GpuBackend final : public DetectionBackend {
   bool has_tree_ = false;
   // The device's measure of the tree when it first refitted it to such boxes.
   std::map<Boxes, double> area_when_built_;
+  double looseness_when_built_ = 0;
   Boxes last_boxes_;
   DecidedContacts decided_;
   NearRadius near_;                  // of the pipeline's near list; its edge length when the tree was built

@@ -32,7 +32,7 @@ bool MovingTree::refitted(Profiler& profiler) {
   refit(kept_.tree, motion_, followed_ ? motion_.resting : std::vector<char>(), pool_);
   profiler.mark("refit");
   fits_ = true;
-  const bool serves = !worn_out(kept_.tree.area, kept_.tree.area_when_built);
+  const bool serves = !worn_out(kept_.tree.wear, kept_.tree.wear_when_built);
   if (serves && own_ && !own_->kept) own_->wore_out_common = false;
   return serves;
 }

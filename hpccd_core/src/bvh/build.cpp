@@ -372,7 +372,7 @@ void build(Tree& tree, const Scene& scene, const Features& features, const Motio
   tree = {};
   Builder(tree, scene, features, motion.boxes, pool).run();
   refit(tree, motion, {}, pool);
-  tree.area_when_built = tree.area;
+  tree.wear_when_built = tree.wear;
 }
 
 }  // namespace hpccd

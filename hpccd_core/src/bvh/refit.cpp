@@ -158,18 +158,41 @@ void join_children(Tree& tree, Node& node) {
   node.box.include(tree.nodes[node.children + 1].box);
 }
 
-// Returns the sum of the areas of the nodes.
-double refit_subtree(Tree& tree, std::uint32_t root, const MotionBounds& motion) {
+double extent(const Box& b) { return double{b.high[0]} - b.low[0] + b.high[1] - b.low[1] + b.high[2] - b.low[2]; }
+double extent(const MotionBox& b) { return extent(b.t0) + extent(b.t1); }
+
+// Of one leaf: the square of its extent relative to that of its edges. (Areas of edges may be zero.)
+double looseness(const Tree& tree, std::uint32_t number, const MotionBounds& motion) {
+  const LeafRange& leaf = tree.leaves[number];
+  const auto& [first, second] = tree.corners_of[number].edge;
+  const auto corner = [&](std::uint8_t k) -> const MotionBox& {
+    return motion.boxes[tree.corners[leaf.first_corner + k]];
+  };
+  double edges = 0;
+  for (std::uint32_t e = 0; e < leaf.n_edges(); ++e) {
+    MotionBox box = corner(first[e]);
+    box.include(corner(second[e]));
+    edges += extent(box);
+  }
+  if (!(edges > 0)) return 0;
+  const double ratio = extent(tree.node_of_leaf(number).box) * leaf.n_edges() / edges;
+  return std::min(ratio * ratio, static_cast<double>(tree.leaves.size()));
+}
+
+// Returns the sums over its nodes and leaves.
+Wear refit_subtree(Tree& tree, std::uint32_t root, const MotionBounds& motion) {
   Node& node = tree.nodes[root];
   if (!node.children) {
     if (node.leaf + 1 < tree.leaves.size()) fetch_ahead(tree, tree.leaves[node.leaf + 1], motion.boxes);
     fit_leaf(tree, node.leaf, motion);
-    return node.box.area();
+    const bool measured = node.leaf % Wear::looseness_stride == 0;
+    return {node.box.area(), measured ? looseness(tree, node.leaf, motion) : 0};
   }
-  const double left = refit_subtree(tree, node.children, motion);
-  const double right = refit_subtree(tree, node.children + 1, motion);
+  Wear sum = refit_subtree(tree, node.children, motion);
+  sum += refit_subtree(tree, node.children + 1, motion);
   join_children(tree, node);
-  return left + right + node.box.area();
+  sum.area += node.box.area();
+  return sum;
 }
 
 // Refits the nodes above a finished subtree: of two siblings the thread that finishes second continues. A serial pass
@@ -196,15 +219,16 @@ void refit(Tree& tree, const MotionBounds& motion, const std::vector<char>& rest
     for (std::size_t i = begin; i < end; ++i) {
       Tree::Subtree& subtree = tree.front[i];
       const bool rests = same_rows && !resting.empty() && resting[tree.nodes[subtree.root].mesh];
-      if (!rests) subtree.area = refit_subtree(tree, subtree.root, motion);
+      if (!rests) subtree.sum = refit_subtree(tree, subtree.root, motion);
       refit_above(tree, subtree.above);
     }
   });
-  double area = 0;
-  for (const Tree::Subtree& subtree : tree.front) area += subtree.area;
-  for (const Tree::AboveFront& above : tree.above_front) area += above.area;
+  Wear sum;
+  for (const Tree::Subtree& subtree : tree.front) sum += subtree.sum;
+  for (const Tree::AboveFront& above : tree.above_front) sum.area += above.area;
   const double root = tree.nodes.empty() ? 0 : tree.nodes[0].box.area();
-  tree.area = root > 0 ? area / root : 0;
+  const std::size_t measured = (tree.leaves.size() + Wear::looseness_stride - 1) / Wear::looseness_stride;
+  tree.wear = root > 0 ? Wear{sum.area / root, sum.looseness / static_cast<double>(measured)} : Wear{};
 }
 
 void fit_leaf(Tree& tree, std::uint32_t number, const MotionBox* corner_boxes) {

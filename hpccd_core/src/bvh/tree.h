@@ -141,6 +141,30 @@ struct alignas(64) Block {
   std::uint32_t node, first_leaf, n_leaves;
 };
 
+// What a search of the tree costs, in two measures that do not depend on the scene's size.
+struct Wear {
+  // Sum of the areas of all nodes, relative to the root's: the cost of traversal grows with it.
+  double area = 0;
+  // Area of the box of a leaf relative to that of its features, which is about the number of leaves that it overlaps:
+  // the mean of every 256th leaf, so that measuring it takes less than a hundredth of the time of a refit.
+  double looseness = 0;
+  static constexpr std::uint32_t looseness_stride = 256;
+
+  Wear& operator+=(const Wear& other) {
+    area += other.area, looseness += other.looseness;
+    return *this;
+  }
+};
+
+// Whether refitting has degraded the tree so much that a new one costs less. The number of visited node pairs is about
+// proportional to the nodes' area, and half as much again costs more than a build. A tree that was built while a mesh
+// was torn apart has so large an area that it never grows by half: once the mesh is whole again, its leaves are loose.
+// It is 12 to 47 in generated and published scenes, whose trees refitting has degraded or not, and less where boxes
+// have grown by a separation; hence the constant.
+inline bool worn_out(const Wear& now, const Wear& when_built) {
+  return now.area > 1.5 * when_built.area || now.looseness > 4 * when_built.looseness + 64;
+}
+
 struct Tree {
   // Primitives of a leaf. With 8, its corners and its edges mostly fill one row each, and each of at most 24 edges has
   // a lane of a GPU's warp.
@@ -157,7 +181,7 @@ struct Tree {
   struct Subtree {
     std::uint32_t root;
     std::uint32_t above;  // its parent, by number in above_front, or none
-    double area = 0;      // sum over its nodes
+    Wear sum{};           // over its nodes and leaves
   };
   std::vector<Subtree> front;
   // The nodes above the front. The thread that finishes the second child of a node refits that node as well.
@@ -206,15 +230,10 @@ struct Tree {
     lines(&face_of_slot[range.first_face], 32), lines(&nodes[leaf_nodes[leaf]], sizeof(Node));
   }
   std::vector<std::uint32_t> least_edge;  // by node, the lowest number of an edge below; empty until it is needed
-  double area = 0;  // sum over nodes, relative to the root's area: the cost of traversal grows with it
-  double area_when_built = 0;
+  Wear wear, wear_when_built;
 
   std::size_t bytes() const;
 };
-
-// Whether refitting has degraded the tree so much that a new one costs less: the number of visited node pairs is about
-// proportional to the nodes' area, and half as much again costs more than a build. Areas are relative to the root's.
-inline bool worn_out(double area, double area_when_built) { return area > 1.5 * area_when_built; }
 
 // Builds a new tree over the current bounds of the motion of each vertex.
 void build(Tree& tree, const Scene& scene, const Features& features, const MotionBounds& motion, ThreadPool& pool);

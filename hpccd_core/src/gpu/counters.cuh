@@ -48,7 +48,7 @@ struct Counters {
   u64 soonest, soonest_proven;  // complements of the bits of the earliest times
   u64 way, away;                // bits of the longest displacements along an axis (device_near_list.cuh)
   u64 listed[2];
-  double area;
+  double area, looseness;  // Wear
 };
 
 // Checks that each pair that the error bounds left undecided was decided by some stage, or goes to the CPU; and for a

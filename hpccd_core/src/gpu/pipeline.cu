@@ -134,7 +134,7 @@ class DevicePipeline : public Pipeline {
   void enqueue(void* stream) override;
   void put_places(const std::vector<PairPlaces>& places) override { places_.put(places_out_, places, on_stream()); }
 
-  double relative_area() const override { return host_counters_.data()->area; }
+  Wear wear() const override { return {host_counters_.data()->area, host_counters_.data()->looseness}; }
   std::map<std::string, std::uint64_t> stats() const override;
   std::map<std::string, double> stages() const override { return timer_.stages(); }
 
@@ -174,7 +174,7 @@ class DevicePipeline : public Pipeline {
   template <class T>
   void launch_results(const LaunchParams<T>& params);
   template <class T>
-  void launch_area(const LaunchParams<T>& params);
+  void launch_wear(const LaunchParams<T>& params);
   template <class T>
   void enqueue_frame();
   void give_places(FrameResult& r) const;
@@ -308,7 +308,7 @@ std::optional<std::vector<PointOnFace>> DevicePipeline::locate_points(Positions 
   undecided_.clear(), passes_ = 1;
   const LaunchParams<T> params = fit_snapshot<T>(vertices, pool);
   launch_points(params, task, on_stream());
-  launch_area(params);
+  launch_wear(params);
   copy_counters();
   std::vector<PointOnFace> found = points_.results(task, stream_);
   if (host_counters_.data()->bad) return std::nullopt;
@@ -320,7 +320,7 @@ NearestPairsFound DevicePipeline::find_nearest(Positions vertices, const std::ve
                                                std::uint64_t version, ThreadPool& pool) {
   undecided_.clear(), passes_ = 0;
   const LaunchParams<T> params = fit_snapshot<T>(vertices, pool);
-  launch_area(params);
+  launch_wear(params);
   for (;;) {
     ++passes_;
     NearestTask task = nearest_.task(pairs, version, params);
@@ -380,7 +380,7 @@ void DevicePipeline::launch(LaunchParams<T>& params) {
   }
   if (goal_ != Goal::earliest) return;
   if (options_.worlds > 1) contacts_.launch_firsts(params, on_stream());
-  launch_area(params);
+  launch_wear(params);
 }
 
 template <class T>
@@ -404,16 +404,16 @@ void DevicePipeline::launch_tree(LaunchParams<T>& params) {
 template <class T>
 void DevicePipeline::launch_results(const LaunchParams<T>& params) {
   contacts_.launch(query_, params, on_stream());
-  launch_area(params);
+  launch_wear(params);
 }
 
 template <class T>
-void DevicePipeline::launch_area(const LaunchParams<T>& params) {
-  area_kernel<<<std::min(blocks_for(std::size_t{params.n_worlds} * params.n_nodes, 256),
+void DevicePipeline::launch_wear(const LaunchParams<T>& params) {
+  wear_kernel<<<std::min(blocks_for(std::size_t{params.n_worlds} * params.n_nodes, 256),
                          static_cast<unsigned>(multiprocessors_)),
                 256, 0, on_>>>(params);
-  check_launch("area_kernel");
-  timer_.mark("area", on_);
+  check_launch("wear_kernel");
+  timer_.mark("wear", on_);
 }
 
 void DevicePipeline::add(const std::vector<Contact>& vertex_face, const std::vector<Contact>& edge_edge) {

@@ -128,7 +128,7 @@ class Pipeline {
   // Discards the near list: distances of vertices now refer to the start of the last frame.
   virtual void forget_near() = 0;
 
-  virtual double relative_area() const = 0;  // of the refitted tree, as in tree.h
+  virtual Wear wear() const = 0;  // of the refitted tree; no area if the frame was rejected
   virtual std::map<std::string, std::uint64_t> stats() const = 0;
   virtual std::map<std::string, double> stages() const = 0;  // device ms by stage, if requested
 };

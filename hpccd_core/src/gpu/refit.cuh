@@ -81,12 +81,43 @@ __device__ inline float area_of(const DeviceBox& b, bool start_alone) {
   return sum;
 }
 
-// Sum of the nodes' areas divided by the root's (Tree::area), the mean of all worlds. If boxes reach up to an
-// intermediate time, their other end is not used.
-template <class T>
-__global__ void area_kernel(LaunchParams<T> params) {
-  if (over(params)) return;  // nothing was refitted, so there is no measure
+__device__ inline double extent_of(const DeviceBox& b, bool start_alone) {
   double sum = 0;
+  for (int end = 0; end < (start_alone ? 1 : 2); ++end)
+    for (int k = 0; k < 3; ++k) sum += double{b.high[end].x[k]} - b.low[end].x[k];
+  return sum;
+}
+
+// As in bvh/refit.cpp. `leaf` is numbered through all worlds.
+template <class T>
+__device__ double looseness_of(const LaunchParams<T>& params, u32 leaf, u32 world) {
+  const DeviceLeaf l = params.leaves[leaf - world * params.n_leaves];
+  const auto corner = [&](u32 k) {
+    const u32 vertex = params.corners[l.first_corner + (k & 0xFF)];
+    return load_point<true>(&params.points[world * params.n_vertices + vertex]);
+  };
+  double edges = 0;
+  for (u32 e = l.first_edge; e < l.first_edge + l.n_edges(); ++e) {
+    const u32 corners = params.leaf_edges[e].corners;
+    DeviceBox box = corner(corners);
+    include(box, corner(corners >> 8));
+    edges += extent_of(box, params.until_best);
+  }
+  if (!(edges > 0)) return 0;
+  const double ratio = extent_of(load_box(&params.leaf_boxes[leaf]), params.until_best) * l.n_edges() / edges;
+  return fmin(ratio * ratio, static_cast<double>(params.n_leaves));
+}
+
+// Wear, the mean of all worlds. If boxes reach up to an intermediate time, their other end is not used.
+template <class T>
+__global__ void wear_kernel(LaunchParams<T> params) {
+  if (over(params)) return;  // nothing was refitted, so there is no measure
+  const u32 stride = Wear::looseness_stride, measured = (params.n_leaves + stride - 1) / stride;
+  double sum = 0, loose = 0;
+  for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < params.n_worlds * measured; i += gridDim.x * blockDim.x) {
+    const u32 world = i / measured;
+    loose += looseness_of(params, world * params.n_leaves + (i - world * measured) * stride, world);
+  }
   for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < params.n_worlds * params.n_nodes;
        i += gridDim.x * blockDim.x) {
     const u32 root = params.by_nodes(i) * params.n_nodes;
@@ -94,8 +125,13 @@ __global__ void area_kernel(LaunchParams<T> params) {
     if (area > 0) sum += area_of(load_box(&params.node_boxes[i]), params.until_best) / area;
   }
   __syncwarp();
-  for (int d = 16; d > 0; d /= 2) sum += __shfl_xor_sync(all_lanes, sum, d);
+  for (int d = 16; d > 0; d /= 2) {
+    sum += __shfl_xor_sync(all_lanes, sum, d);
+    loose += __shfl_xor_sync(all_lanes, loose, d);
+  }
   if (lane_number() == 0 && sum > 0) atomicAdd(&params.counters->area, sum / params.n_worlds);
+  if (lane_number() == 0 && loose > 0)
+    atomicAdd(&params.counters->looseness, loose / (static_cast<double>(params.n_worlds) * measured));
 }
 
 }  // namespace hpccd::gpu

@@ -30,7 +30,7 @@ class FrontBased final : public MethodEngine {
     if (whole_) {
       refit(h_, context_.features, vertex_boxes, context_.pool);
       profiler.mark("refit");
-      whole_ = !worn_out(relative_area(h_), area_when_built_);
+      whole_ = !worn_out({relative_area(h_)}, {area_when_built_});
     }
     if (!whole_) {
       build(h_, context_.features, vertex_boxes, context_.pool);

@@ -42,7 +42,7 @@ struct Trees {
     moving.begin_world(own, budget, always);
     moving.bound(test::view(positions), test::view(positions), {});
     moving.fit(profiler);
-    EXPECT_FALSE(worn_out(moving.tree().area, moving.tree().area_when_built));
+    EXPECT_FALSE(worn_out(moving.tree().wear, moving.tree().wear_when_built));
     const std::uint64_t number = moving.number();
     moving.end_world();
     return number;

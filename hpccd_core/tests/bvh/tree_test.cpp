@@ -187,7 +187,8 @@ struct LargeTreeTest : Sheets {
   ThreadPool one{1}, four{4};
 
   static void expect_equal_boxes(const Tree& a, const Tree& b, const std::string& when) {
-    EXPECT_EQ(a.area, b.area) << when;
+    EXPECT_EQ(a.wear.area, b.wear.area) << when;
+    EXPECT_EQ(a.wear.looseness, b.wear.looseness) << when;
     ASSERT_EQ(a.nodes.size(), b.nodes.size());
     for (std::size_t i = 0; i < a.nodes.size(); ++i)
       ASSERT_EQ(0, std::memcmp(&a.nodes[i].box, &b.nodes[i].box, sizeof(MotionBox))) << when << ", node " << i;
@@ -202,7 +203,7 @@ TEST_F(LargeTreeTest, IsBuiltAlikeByAnyNumberOfThreads) {
     ThreadPool many(threads);
     Tree shared;
     build(shared, *scene, features, motion, many);
-    EXPECT_EQ(alone.area, shared.area);
+    EXPECT_EQ(alone.wear.area, shared.wear.area);
     EXPECT_EQ(alone.face_of_slot, shared.face_of_slot);
     EXPECT_EQ(alone.edge_of_slot, shared.edge_of_slot);
     EXPECT_EQ(alone.vertex_of_slot, shared.vertex_of_slot);
