@@ -107,6 +107,8 @@ def positions(name: str, value: Any, expected: tuple[int, ...], stream: int | No
         raise ValueError(f"{name}: must be C-contiguous, got strides {strides} bytes; copy it first")
     if some and not pointer:
         raise ValueError(f"{name}: its address on the device is null; give an array that holds memory")
+    if some and pointer % size:
+        raise ValueError(f"{name}: its address must be a multiple of {size} bytes, the size of a number; copy it first")
     return DevicePositions(int(pointer or 0), size == 8, stream)
 
 
@@ -119,8 +121,14 @@ def _in_order(shape: tuple[int, ...], strides: tuple[int, ...], size: int) -> bo
 def _from_interface(name: str, interface: Any) -> _Layout:
     try:
         strides, mask = interface.get("strides"), interface.get("mask")
-        strides = None if strides is None else tuple(strides)
-        place = tuple(interface["shape"]), strides, interface["typestr"], interface["data"][0]
+        shape, strides = tuple(interface["shape"]), None if strides is None else tuple(strides)
+        if strides is not None and len(strides) != len(shape):
+            raise TypeError(f"shape {shape}, strides {strides}")
+        kind, address = interface["typestr"], interface["data"][0]
+        address = None if address is None else operator.index(address)
+        if not 0 <= (address or 0) < 1 << 64:
+            raise TypeError(f"address {address}")
+        place = shape, strides, kind, address
     except (AttributeError, IndexError, KeyError, TypeError) as error:
         raise TypeError(f"{name}: its __cuda_array_interface__ does not follow the protocol ({error!r})") from None
     if mask is not None:

@@ -553,13 +553,25 @@ hpccd_core._core.Cancelled: the detector was cancelled; create another one
       .def(
           "proximity_at",
           [](Detector& d, const Array<double>& poses, const GivenPositions& others, double distance) {
-            return to_dict(unlocked([&] { return d.proximity_at(poses_of(poses), distance, others.positions); }));
+            return rows_where_asked(
+                d,
+                [&] {
+                  const std::vector<double> x = d.positions_at(poses_of(poses), others.positions);
+                  return d.proximity_on_device(Positions::of(x), distance);
+                },
+                [&] { return d.proximity_at(poses_of(poses), distance, others.positions); });
           },
           "poses"_a, "others"_a, "distance"_a)
       .def(
           "intersections_at",
           [](Detector& d, const Array<double>& poses, const GivenPositions& others) {
-            return to_dict(unlocked([&] { return d.intersections_at(poses_of(poses), others.positions); }));
+            return rows_where_asked(
+                d,
+                [&] {
+                  const std::vector<double> x = d.positions_at(poses_of(poses), others.positions);
+                  return d.intersections_on_device(Positions::of(x));
+                },
+                [&] { return d.intersections_at(poses_of(poses), others.positions); });
           },
           "poses"_a, "others"_a)
       .def(

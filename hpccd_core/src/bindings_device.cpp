@@ -56,6 +56,17 @@ struct DeviceArray {
   std::string type() const { return std::string("<") + kind + std::to_string(item_bytes); }
 };
 
+// The same memory, freed without the interpreter's lock: freeing waits for the device, which may wait for functions
+// that other Python threads run.
+std::shared_ptr<const void> freed_unlocked(std::shared_ptr<const void> memory) {
+  const void* data = memory.get();
+  return {data, [memory = std::move(memory)](const void*) mutable {
+            if (!PyGILState_Check()) return memory.reset();
+            py::gil_scoped_release release;
+            memory.reset();
+          }};
+}
+
 py::dict interface_of(const DeviceArray& a) {
   py::dict d;
   d["shape"] = py::tuple(py::cast(a.shape));
@@ -104,7 +115,7 @@ DeviceArray rows_of(const DeviceArray& a, std::int64_t begin, std::int64_t end) 
 
 // Row k, without a copy and without the first axis.
 DeviceArray row_of(const DeviceArray& a, std::int64_t k) {
-  if (k < 0) throw py::index_error("row: out of range");
+  if (k < 0 || a.shape.empty() || k >= a.shape[0]) throw py::index_error("row: out of range");
   DeviceArray row = rows_of(a, k, k + 1);
   row.shape.erase(row.shape.begin());
   return row;
@@ -114,10 +125,11 @@ DeviceArray row_of(const DeviceArray& a, std::int64_t k) {
 std::shared_ptr<const void> copied_there(const void* a, std::size_t a_bytes, const void* b, std::size_t b_bytes,
                                          int device) {
   py::gil_scoped_release release;
-  return gpu::joined_on_device(a, a_bytes, b, b_bytes, device);
+  return freed_unlocked(gpu::joined_on_device(a, a_bytes, b, b_bytes, device));
 }
 
 DeviceArray joined(const DeviceArray& a, const DeviceArray& b) {
+  if (a.shape.empty() || b.shape.empty()) throw py::type_error("joined: an array without axes has no rows");
   const auto bytes = [](const DeviceArray& x) {
     return static_cast<std::size_t>(x.size()) * static_cast<std::size_t>(x.item_bytes);
   };
@@ -188,7 +200,11 @@ With a GPU and CuPy::
           "dtype", [](const DeviceArray& a) { return py::dtype(a.type()); }, "numpy.dtype of the elements.")
       .def_property_readonly(
           "device", [](const DeviceArray& a) { return a.device; }, "Number of the GPU in CUDA.")
-      .def("__len__", [](const DeviceArray& a) { return a.shape[0]; })
+      .def("__len__",
+           [](const DeviceArray& a) {
+             if (a.shape.empty()) throw py::type_error("len() of an array without axes");
+             return a.shape[0];
+           })
       .def_property_readonly("__cuda_array_interface__", &interface_of)
       .def("__array__", &refuse_numpy, py::arg("dtype") = py::none(), py::arg("copy") = py::none())
       .def("__dlpack_device__", [](const DeviceArray& a) { return py::make_tuple(on_cuda, a.device); })
@@ -286,8 +302,9 @@ RuntimeError
 }
 
 py::dict to_dict(const DeviceResults& r, std::uint32_t n_worlds) {
+  const std::shared_ptr<const void> memory = freed_unlocked(r.memory);
   const auto array = [&](const void* data, char kind, int item_bytes, std::vector<std::int64_t> shape) {
-    return py::cast(DeviceArray{r.memory, data, std::move(shape), kind, item_bytes, r.device});
+    return py::cast(DeviceArray{memory, data, std::move(shape), kind, item_bytes, r.device});
   };
   const auto n_vf = static_cast<std::int64_t>(r.n_vf), n_ee = static_cast<std::int64_t>(r.n_ee),
              n_ef = static_cast<std::int64_t>(r.n_ef);
@@ -329,7 +346,9 @@ py::dict to_dict(const std::vector<Gap>& gaps, std::uint32_t n_worlds, std::opti
   {
     py::gil_scoped_release release;
     packed = std::make_shared<const GapFields>(gaps);
-    if (device) there = gpu::joined_on_device(packed->block().data(), packed->block().size(), nullptr, 0, *device);
+    if (device)
+      there =
+          freed_unlocked(gpu::joined_on_device(packed->block().data(), packed->block().size(), nullptr, 0, *device));
   }
   const auto* begin = static_cast<const unsigned char*>(device ? there.get() : packed->block().data());
   const std::size_t n_pairs = gaps.size() / n_worlds;
@@ -357,8 +376,9 @@ namespace {
 // The output arrays of a prepared detection.
 py::dict arrays_of(const PreparedDetection& d, std::uint32_t n_worlds) {
   const PreparedResults& p = d.results();
+  const std::shared_ptr<const void> memory = freed_unlocked(p.memory);
   const auto array = [&](const void* data, char kind, int item_bytes, std::vector<std::int64_t> shape) {
-    return py::cast(DeviceArray{p.memory, data, std::move(shape), kind, item_bytes, p.device});
+    return py::cast(DeviceArray{memory, data, std::move(shape), kind, item_bytes, p.device});
   };
   const auto n_vf = static_cast<std::int64_t>(p.room_vf), n_ee = static_cast<std::int64_t>(p.room_ee);
   const auto* counts = reinterpret_cast<const unsigned char*>(p.counts);

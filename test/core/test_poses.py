@@ -114,6 +114,24 @@ def test_results_are_those_of_the_positions(number, threads):
             assert_equal(by_poses, by_positions, poses, shapes.positions(poses), 0.03 * reach)
 
 
+@pytest.mark.parametrize("backend", [name for name in ("cpu", "gpu") if name in hc.backends()])
+@pytest.mark.parametrize("ignored", ["faces", "pairs"])
+@pytest.mark.parametrize("position", [[0.7, 0.6, 0.5], [0.5, 0, 0], [0, 0, 0.25]])
+def test_which_lies_inside_where_contacts_are_ignored(position, ignored, backend):
+    """Boxes may intersect unnoticed: whether the box of one is within that of the other must not matter."""
+    shapes = Shapes([(BOX, BOX_FACES), (0.5 * BOX, BOX_FACES)], self_collision=False)
+    poses = [[0, 0, 0, 0, 0, 0, 1], [*position, 0, 0, 0, 1]]
+    positions = shapes.positions(poses)
+    found = hc.Detector(shapes.scene, backend="cpu").intersections(positions)
+    if ignored == "faces":
+        shapes.scene.ignore_faces("m0", np.arange(len(BOX_FACES)), "m1")
+    else:
+        shapes.scene.ignore_features(ef=found.ef)
+    (gap,) = hc.Detector(shapes.scene, backend=backend).distances(positions)
+    assert gaps_as_bits([gap]) == gaps_as_bits(hc.Detector(shapes.scene, backend="cpu").distances(poses=poses))
+    assert gap.distance > 0 or ignored == "pairs"
+
+
 def test_slow_motions_and_contact_that_begins_and_ends():
     shapes = Shapes([(BALL, BALL_FACES), (BALL, BALL_FACES)], static={0}, self_collision=False)
     options = {"backend": "cpu", "threads": 2, "outputs": ALL_OUTPUTS}

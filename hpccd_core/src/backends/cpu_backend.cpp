@@ -316,7 +316,8 @@ Intersections CpuBackend::intersections(const Snapshot& snapshot) {
 
 std::vector<Gap> CpuBackend::distances(const Snapshot& snapshot) {
   if (!mesh_pairs_) mesh_pairs_.emplace(shared_.rules, shared_.scene->meshes().size());
-  if (!containment_) containment_.emplace(*shared_.scene, shared_.features, *mesh_pairs_, shared_.cancellation);
+  if (!containment_)
+    containment_.emplace(*shared_.scene, shared_.features, shared_.rules, *mesh_pairs_, shared_.cancellation);
   NearestPairs nearest(*mesh_pairs_, shared_.rules, &shared_.common.filter.view(), shared_.features, snapshot.motion,
                        snapshot.tree, shared_.common.thickness, snapshot.placed);
   DistanceSearch search(snapshot.tree, shared_.rules, shared_.options.simd, nearest);

@@ -22,7 +22,7 @@ void GpuBackend::prepare_distances() {
   if (mesh_pairs_ && version_of_pairs_ == thickness.version()) return;
   if (!mesh_pairs_) {
     mesh_pairs_.emplace(shared_.rules, shared_.scene->meshes().size());
-    containment_.emplace(*shared_.scene, shared_.features, *mesh_pairs_, shared_.cancellation);
+    containment_.emplace(*shared_.scene, shared_.features, shared_.rules, *mesh_pairs_, shared_.cancellation);
     contained_.resize(n_worlds());
   }
   version_of_pairs_ = thickness.version();

@@ -21,8 +21,7 @@ class DeviceContacts {
   DeviceContacts(u32 key_bits, std::size_t n_groups, u32 n_worlds, bool on_device)
       : key_bits_(static_cast<int>(key_bits)), n_groups_(n_groups), n_worlds_(n_worlds), pool_(on_device) {
     if (n_groups >= 0x7FFFFFFF) throw Error("2^31 or more vertices and edges in all worlds; use backend=\"cpu\"");
-    n_of_group_.reserve(n_groups + 1);
-    check(cudaMemset(n_of_group_.data(), 0, n_of_group_.bytes()), "cudaMemset");
+    n_of_group_.reserve_filled(n_groups + 1, 0);
     first_of_group_.reserve(n_groups + 1);
     sum_workspace_.reserve(sum_workspace(static_cast<int>(n_groups + 1)));
   }

@@ -45,11 +45,8 @@ class DeviceNearest {
   NearestTask task(const std::vector<PairToSearch>& pairs, u64 version, const LaunchParams<T>& params) {
     const auto n = static_cast<u32>(pairs.size()), all = n * n_worlds_;
     if (!uploaded_ || version_ != version) upload_meshes(pairs), version_ = version, uploaded_ = true;
-    if (so_far_.size() < all) {
-      so_far_.reserve(all);
-      check(cudaMemset(so_far_.data(), 0xFF, so_far_.bytes()), "cudaMemset");  // no pairs
-      results_.reserve(all), host_results_.reserve(all);
-    }
+    so_far_.reserve_filled(all, 0xFF);  // no pairs
+    results_.reserve(all), host_results_.reserve(all);
     counters_.reserve(1), host_counters_.reserve(1);
     const std::size_t leaves = std::size_t{params.n_leaves} * n_worlds_;
     for (DeviceBuffer<uint4>& nodes : nodes_) nodes.reserve(std::max<std::size_t>({leaves, all, 1u << 16}));

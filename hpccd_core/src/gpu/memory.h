@@ -11,7 +11,13 @@ namespace hpccd::gpu {
 
 struct DeviceMemory {
   static cudaError_t allocate(void** p, std::size_t bytes) { return cudaMalloc(p, bytes); }
-  static void release(void* p) { cudaFree(p); }
+  static void release(void* p) {
+    // While a graph is captured, cudaFree is an error otherwise: of whoever lets go of a result then.
+    cudaStreamCaptureMode mode = cudaStreamCaptureModeRelaxed;
+    cudaThreadExchangeStreamCaptureMode(&mode);
+    cudaFree(p);
+    cudaThreadExchangeStreamCaptureMode(&mode);
+  }
   static constexpr const char* name = "cudaMalloc";
 };
 
@@ -37,6 +43,18 @@ class Buffer {
     check(Memory::allocate(&p, n * sizeof(T)), Memory::name);
     data_ = static_cast<T*>(p);
     size_ = n;
+  }
+  // The same for device memory; each byte is set when it grows. After a failure there is no memory.
+  void reserve_filled(std::size_t n, int byte) {
+    if (n <= size_) return;
+    reserve(n);
+    try {
+      check(cudaMemset(data_, byte, bytes()), "cudaMemset");
+      check(cudaStreamSynchronize(nullptr), "cudaStreamSynchronize");  // for kernels on any stream
+    } catch (...) {
+      release();
+      throw;
+    }
   }
   T* data() const { return data_; }
   std::size_t size() const { return size_; }

@@ -38,7 +38,7 @@ class TestLists {
           separated_[k].reserve(s.separated[k]);
     undecided_.reserve(s.undecided);
     for (auto& list : open_) list.reserve(s.open);
-    reserve_answers(s.open);
+    answers_.reserve_filled(s.open, 0xFF);
     to_host_.reserve(s.to_host);
   }
   Sizes sizes() const {
@@ -109,7 +109,7 @@ class TestLists {
     for (auto& list : open_) grow(list, c.open_in_integers[0], false);  // no list is longer than the first
     if (c.open_in_integers[0] > answers_.size()) {
       again = true;
-      reserve_answers(c.open_in_integers[0] + c.open_in_integers[0] / 4);
+      answers_.reserve_filled(c.open_in_integers[0] + c.open_in_integers[0] / 4, 0xFF);
     }
     grow(to_host_, c.to_host, false);
     if (more_segments) n_segments_ *= 2;
@@ -134,14 +134,6 @@ class TestLists {
   // Lists of one pass stay below this size; larger frames take several segments.
   static constexpr std::size_t most_listed = std::size_t{1} << 26;
   u32 n_segments_ = 1;
-
-  // Allocates results in the initial state (integer_stages.cu); complete when this returns, for kernels on any stream.
-  void reserve_answers(std::size_t n) {
-    if (n <= answers_.size()) return;
-    answers_.reserve(n);
-    check(cudaMemset(answers_.data(), 0xFF, answers_.size() * sizeof(double)), "cudaMemset");
-    check(cudaStreamSynchronize(nullptr), "cudaStreamSynchronize");
-  }
 
   static bool shorter(const DeviceBuffer<u64>& a, const DeviceBuffer<u64>& b) { return a.size() < b.size(); }
 };

@@ -49,9 +49,9 @@ std::size_t ContainmentMemory::bytes() const {
 }
 
 // Only of meshes that may lie inside others or contain them.
-Containment::Containment(const Scene& scene, const Features& features, const MeshPairs& pairs,
+Containment::Containment(const Scene& scene, const Features& features, const PairRules& rules, const MeshPairs& pairs,
                          const Cancellation& cancellation)
-    : scene_(scene), features_(features), pairs_(pairs), closed_(scene.meshes().size(), false) {
+    : scene_(scene), features_(features), rules_(rules), pairs_(pairs), closed_(scene.meshes().size(), false) {
   std::vector<char> paired(closed_.size(), false);
   for (std::size_t i = 0; i < pairs.size(); ++i)
     if (pairs[i][0] != pairs[i][1]) paired[pairs[i][0]] = paired[pairs[i][1]] = true;
@@ -78,8 +78,8 @@ std::deque<Containment::Question> Containment::questions_of(std::span<Gap> gaps,
       const Extent &whole = snapshot.extent_of_mesh(outer), &part = snapshot.extent_of_mesh(inner);
       const std::span<const std::uint32_t> vertices = components(inner);
       // The extents of meshes at poses are not the least ones: then the inner one may extend beyond the outer one.
-      const bool least = vertices.size() == 1 && !placed;
-      if (least ? !(within(part.low, whole) && within(part.high, whole)) : !overlap(part, whole)) return;
+      const bool by_box = !placed && needs_box(inner, outer);
+      if (by_box ? !(within(part.low, whole) && within(part.high, whole)) : !overlap(part, whole)) return;
       Question& q = questions.emplace_back(gap, answer, 2 * i + (answer == Inside::b), inner, outer);
       for (std::uint32_t c = 0; c < vertices.size(); ++c)
         if (within(position(snapshot, placed, vertices[c]).data(), whole)) q.candidates.push_back(c);

@@ -14,6 +14,7 @@
 #include "bvh/placed_meshes.h"
 #include "bvh/tree.h"
 #include "hpccd/results.h"
+#include "scene/pair_rules.h"
 #include "solid/outside_list.h"
 #include "traverse/mesh_pairs.h"
 
@@ -35,7 +36,8 @@ struct ContainmentMemory {
 class Containment {
  public:
   // The arguments must outlive the object.
-  Containment(const Scene& scene, const Features& features, const MeshPairs& pairs, const Cancellation& cancellation);
+  Containment(const Scene& scene, const Features& features, const PairRules& rules, const MeshPairs& pairs,
+              const Cancellation& cancellation);
 
   // Sets Gap::inside of each pair of meshes, in the order of the pairs. The tree is that of the snapshot; placed: its
   // meshes if they are at poses, otherwise null. Throws Cancelled.
@@ -48,18 +50,25 @@ class Containment {
   }
   // Whether one mesh may lie inside another, as far as their boxes tell.
   bool possible(std::uint32_t inner, std::uint32_t outer, bool boxes_meet, bool within_box) const {
-    return closed_[outer] && (components(inner).size() == 1 ? within_box : boxes_meet);
+    return closed_[outer] && (needs_box(inner, outer) ? within_box : boxes_meet);
   }
 
   std::size_t bytes() const { return closed_.capacity() + 4 * (first_.capacity() + vertices_.capacity()); }
 
  private:
+  // Whether the first mesh is inside only if its box is inside that of the other. Meshes with ignored contacts may
+  // intersect unnoticed: then their vertices alone decide.
+  bool needs_box(std::uint32_t inner, std::uint32_t outer) const {
+    return components(inner).size() == 1 && !rules_.rule(inner, outer).filtered;
+  }
+
   struct Question;
   std::deque<Question> questions_of(std::span<Gap> gaps, const MotionBounds& snapshot,
                                     const PlacedMeshes* placed) const;
 
   const Scene& scene_;
   const Features& features_;
+  const PairRules& rules_;
   const MeshPairs& pairs_;
   std::vector<char> closed_;                     // by mesh
   std::vector<std::uint32_t> first_, vertices_;  // by mesh, one vertex of each connected component
