@@ -88,7 +88,7 @@ __device__ inline double extent_of(const DeviceBox& b, bool start_alone) {
   return sum;
 }
 
-// As in bvh/refit.cpp. `leaf` is numbered through all worlds.
+// As in bvh/refit.cpp: the whole warp, a lane for each edge. `leaf` is numbered through all worlds.
 template <class T>
 __device__ double looseness_of(const LaunchParams<T>& params, u32 leaf, u32 world) {
   const DeviceLeaf l = params.leaves[leaf - world * params.n_leaves];
@@ -97,12 +97,13 @@ __device__ double looseness_of(const LaunchParams<T>& params, u32 leaf, u32 worl
     return load_point<true>(&params.points[world * params.n_vertices + vertex]);
   };
   double edges = 0;
-  for (u32 e = l.first_edge; e < l.first_edge + l.n_edges(); ++e) {
-    const u32 corners = params.leaf_edges[e].corners;
+  if (lane_number() < l.n_edges()) {
+    const u32 corners = params.leaf_edges[l.first_edge + lane_number()].corners;
     DeviceBox box = corner(corners);
     include(box, corner(corners >> 8));
-    edges += extent_of(box, params.until_best);
+    edges = extent_of(box, params.until_best);
   }
+  for (int d = 16; d > 0; d /= 2) edges += __shfl_xor_sync(all_lanes, edges, d);
   if (!(edges > 0)) return 0;
   const double ratio = extent_of(load_box(&params.leaf_boxes[leaf]), params.until_best) * l.n_edges() / edges;
   return fmin(ratio * ratio, static_cast<double>(params.n_leaves));
@@ -114,7 +115,8 @@ __global__ void wear_kernel(LaunchParams<T> params) {
   if (over(params)) return;  // nothing was refitted, so there is no measure
   const u32 stride = Wear::looseness_stride, measured = (params.n_leaves + stride - 1) / stride;
   double sum = 0, loose = 0;
-  for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < params.n_worlds * measured; i += gridDim.x * blockDim.x) {
+  for (u32 i = (blockIdx.x * blockDim.x + threadIdx.x) / 32; i < params.n_worlds * measured;
+       i += gridDim.x * blockDim.x / 32) {
     const u32 world = i / measured;
     loose += looseness_of(params, world * params.n_leaves + (i - world * measured) * stride, world);
   }
@@ -125,10 +127,7 @@ __global__ void wear_kernel(LaunchParams<T> params) {
     if (area > 0) sum += area_of(load_box(&params.node_boxes[i]), params.until_best) / area;
   }
   __syncwarp();
-  for (int d = 16; d > 0; d /= 2) {
-    sum += __shfl_xor_sync(all_lanes, sum, d);
-    loose += __shfl_xor_sync(all_lanes, loose, d);
-  }
+  for (int d = 16; d > 0; d /= 2) sum += __shfl_xor_sync(all_lanes, sum, d);
   if (lane_number() == 0 && sum > 0) atomicAdd(&params.counters->area, sum / params.n_worlds);
   if (lane_number() == 0 && loose > 0)
     atomicAdd(&params.counters->looseness, loose / (static_cast<double>(params.n_worlds) * measured));
