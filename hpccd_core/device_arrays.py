@@ -107,7 +107,7 @@ def positions(name: str, value: Any, expected: tuple[int, ...], stream: int | No
         raise ValueError(f"{name}: must be C-contiguous, got strides {strides} bytes; copy it first")
     if some and not pointer:
         raise ValueError(f"{name}: its address on the device is null; give an array that holds memory")
-    if some and pointer % size:
+    if pointer and pointer % size:
         raise ValueError(f"{name}: its address must be a multiple of {size} bytes, the size of a number; copy it first")
     return DevicePositions(int(pointer or 0), size == 8, stream)
 

@@ -177,7 +177,10 @@ def arrays(result: _Result) -> dict[str, Any]:
         If it is none of these results.
     """
     if not isinstance(result, _Result):
-        raise TypeError(f"result: expected that of detect, proximity, intersections or, on the device, distances, got {type(result).__name__}")
+        raise TypeError(
+            "result: expected that of detect, proximity, intersections or, on the device, distances, got "
+            f"{type(result).__name__}"
+        )
     found = {field.name: getattr(result, field.name) for field in dataclasses.fields(result)}
     found |= getattr(result, "outputs", {})
     if getattr(result, "slices", None) is not None:
