@@ -51,6 +51,17 @@ bool far_apart(const Node& a, const Node& b, float reach) {
   return size < reach;
 }
 
+bool share_a_vertex(const Tree& tree, const LeafRange& a, const LeafRange& b) {
+  const std::uint32_t *of_a = tree.corners.data() + a.first_corner, *of_b = tree.corners.data() + b.first_corner;
+  const std::uint32_t n_a = a.n_corners(), n_b = b.n_corners();
+  for (std::uint32_t i = 0; i < n_a; ++i) {
+    std::uint32_t equal = 0;
+    for (std::uint32_t j = 0; j < n_b; ++j) equal |= of_a[i] == of_b[j];
+    if (equal) return true;
+  }
+  return false;
+}
+
 // Gilbert's algorithm (1966) for the point of the Minkowski difference that is nearest to zero: each step gives a
 // direction along which the hulls may be apart, and a lower bound on their distance.
 //

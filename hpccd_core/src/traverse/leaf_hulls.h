@@ -16,6 +16,9 @@ inline float reach_of(double distance, double rounding, double scale) {
 // Whether boxes grown by this reach cover most of two leaves, so that a closer test is worthwhile.
 bool far_apart(const Node& a, const Node& b, float reach);
 
+// Whether two leaves have a vertex in common, as most near leaves of a mesh do: the hulls then touch.
+bool share_a_vertex(const Tree& tree, const LeafRange& a, const LeafRange& b);
+
 // In one snapshot, in coordinates of the boxes; `reach` as returned by reach_of(). Axis-aligned boxes of slanted
 // features are larger than the features by nearly their own size: of sixty separate spheres, boxes leave 182,000 pairs
 // of leaves, this test 13,000.

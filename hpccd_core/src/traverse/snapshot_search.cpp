@@ -38,8 +38,9 @@ std::pair<std::uint32_t, std::uint32_t> meshes_of(const NearestPairs& nearest, c
 bool apart_by_hulls(const Tree& tree, LeafPair pair, float reach, const Worker& worker) {
   const bool hulls_tell = pair.first != pair.second && reach > 0 && reach < std::numeric_limits<float>::infinity() &&
                           !tree.grown && !tree.bent;
-  return hulls_tell && worker.boxes_leave_much() &&
-         farther_apart(tree, tree.leaves[pair.first], tree.leaves[pair.second], reach);
+  if (!hulls_tell || !worker.boxes_leave_much()) return false;
+  const LeafRange &a = tree.leaves[pair.first], &b = tree.leaves[pair.second];
+  return !share_a_vertex(tree, a, b) && farther_apart(tree, a, b, reach);
 }
 
 }  // namespace

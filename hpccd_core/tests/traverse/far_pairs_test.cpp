@@ -12,6 +12,7 @@
 #include "base/simd.h"
 #include "bvh/motion_bounds.h"
 #include "elementary/exact/distance.h"
+#include "grid_scene.h"
 #include "soup_scene.h"
 #include "traverse/leaf_hulls.h"
 #include "traverse/near_corners.h"
@@ -137,6 +138,24 @@ TEST(FarPairs, NoneIsMissedThatIsWithinTheReach) {
     }
   EXPECT_LT(kept, all / 4);
   EXPECT_GT(leaves_apart, leaves / 8);
+}
+
+TEST(FarPairs, LeavesShareAVertexIfOneIsACornerOfBoth) {
+  const TwoMeshes m(test::two_sheets(20), test::sheet_positions(20, 0), {}, 1);
+  std::size_t sharing = 0;
+  for (const LeafRange& a : m.tree.leaves)
+    for (const LeafRange& b : m.tree.leaves) {
+      const auto corners = [&](const LeafRange& leaf) {
+        return std::set(m.tree.corners.begin() + leaf.first_corner, m.tree.corners.begin() + leaf.end_corner);
+      };
+      const std::set<std::uint32_t> of_a = corners(a), of_b = corners(b);
+      const bool share = std::ranges::any_of(of_a, [&](std::uint32_t v) { return of_b.contains(v); });
+      EXPECT_EQ(share_a_vertex(m.tree, a, b), share);
+      sharing += share;
+    }
+  const std::size_t n = m.tree.leaves.size();
+  EXPECT_GT(sharing, 3 * n);
+  EXPECT_LT(sharing, n * n / 2);
 }
 
 TEST(FarPairs, NearCornersAreNoNearerThanTheMeshes) {
