@@ -343,8 +343,8 @@ class Gap(ComparedByRows):
         "a" if a connected component of `mesh_a` lies inside `mesh_b` without touching it, "b" for the reverse. A
         component is what shared vertices connect: faces, edges, or a single vertex. Exact; None where the surfaces
         touch, without any thickness, and within a mesh. Where contacts of the two meshes are ignored, one vertex of
-        each component decides. Only closed meshes contain anything (:func:`hpccd_core.closed`): what their faces wind
-        around, whichever way they are oriented.
+        each component decides, of a connected mesh also its box. Only closed meshes contain anything
+        (:func:`hpccd_core.closed`): what their faces wind around, whichever way they are oriented.
 
     Examples
     --------

@@ -141,8 +141,8 @@ struct Gap {
   /// a: a connected component of mesh_a (features joined by shared vertices: of faces, edges or a single vertex) lies
   /// inside mesh_b without touching it: the winding number of mesh_b around it is not 0. Exact; none where the surfaces
   /// touch, without any thickness, and within a mesh. Where contacts of the two meshes are ignored, one vertex of each
-  /// component decides. Only closed meshes contain anything: each edge of their faces is in exactly two of them, in
-  /// opposite directions.
+  /// component decides, of a connected mesh also its box. Only closed meshes contain anything: each edge of their faces
+  /// is in exactly two of them, in opposite directions.
   Inside inside = Inside::none;
 };
 

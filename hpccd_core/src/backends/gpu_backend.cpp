@@ -339,8 +339,8 @@ void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
   shared_.profiler.mark("build");
 }
 
-// Compares the last frame with the first one whose boxes were of the same kind, which may be later than the build:
-// looseness does not depend on their kind.
+// Compares the area with that of the first frame whose boxes were of the same kind, and the looseness, for which their
+// kind matters little, with that of the build.
 bool GpuBackend::worn_out_on_device() {
   const Wear wear = pipeline_->wear();
   if (!(wear.area > 0)) return false;

@@ -137,7 +137,7 @@ NearestPair GpuBackend::decide_nearest(const gpu::UndecidedNearest& u, double li
 }
 
 // Where boxes of meshes allow it, the device computes winding numbers. The CPU decides the worlds in which these need
-// integers, or are very many.
+// integers or are very many, and those in which surfaces may intersect unnoticed, as their exact boxes then decide.
 void GpuBackend::decide_containment(std::vector<Gap>& gaps, const std::vector<gpu::NearestOfMeshes>& nearest,
                                     Positions vertices) {
   struct Question {
@@ -148,6 +148,7 @@ void GpuBackend::decide_containment(std::vector<Gap>& gaps, const std::vector<gp
   };
   std::vector<Question> questions;
   std::vector<gpu::VertexInMesh> asked;
+  std::vector<char> left_open(n_worlds(), false);
   for (std::size_t i = 0; i < gaps.size(); ++i) {
     Gap& gap = gaps[i];
     const gpu::NearestOfMeshes& n = nearest[i];
@@ -158,13 +159,13 @@ void GpuBackend::decide_containment(std::vector<Gap>& gaps, const std::vector<gp
       const std::size_t begin = asked.size();
       for (const std::uint32_t v : containment_->components(inner)) asked.push_back({world, v, outer});
       questions.push_back({&gap, answer, world, begin, asked.size()});
+      if (shared_.rules.rule(inner, outer).filtered) left_open[world] = true;
     };
     ask(Inside::a, gap.mesh_a, gap.mesh_b, n.a_within_b), ask(Inside::b, gap.mesh_b, gap.mesh_a, n.b_within_a);
   }
   if (questions.empty()) return;
   std::vector<std::int32_t> numbers(asked.size(), gpu::undecided_winding);
   if (asked.size() <= most_asked_vertices) numbers = pipeline_->windings_of(asked);
-  std::vector<char> left_open(n_worlds(), false);
   for (const Question& q : questions)
     for (std::size_t i = q.begin; i < q.end; ++i)
       if (numbers[i] == gpu::undecided_winding) left_open[q.world] = true;

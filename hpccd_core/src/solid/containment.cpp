@@ -26,6 +26,8 @@ bool within(const double* x, const Extent& e) {
   return true;
 }
 
+bool within(const Extent& a, const Extent& b) { return within(a.low, b) && within(a.high, b); }
+
 // Following the list reads all vertices of the mesh: 1,000 of them in the time of one decision.
 bool list_would_pay(std::size_t vertices, std::size_t of_mesh) { return vertices >= 16 && 1000 * vertices >= of_mesh; }
 
@@ -67,6 +69,18 @@ Containment::Containment(const Scene& scene, const Features& features, const Pai
   }
 }
 
+// Of the mesh at its pose, computed from all its vertices.
+Extent Containment::least_extent(std::uint32_t mesh, const MotionBounds& snapshot, const PlacedMeshes& placed) const {
+  const Scene::Mesh& m = scene_.meshes()[mesh];
+  Extent extent;
+  for (std::uint32_t v = m.first_vertex; v < m.first_vertex + m.n_vertices; ++v) {
+    const std::array<double, 3> x = position(snapshot, &placed, v);
+    for (int k = 0; k < 3; ++k)
+      extent.low[k] = std::min(extent.low[k], x[k]), extent.high[k] = std::max(extent.high[k], x[k]);
+  }
+  return extent;
+}
+
 std::deque<Containment::Question> Containment::questions_of(std::span<Gap> gaps, const MotionBounds& snapshot,
                                                             const PlacedMeshes* placed) const {
   std::deque<Question> questions;
@@ -78,12 +92,17 @@ std::deque<Containment::Question> Containment::questions_of(std::span<Gap> gaps,
       const Extent &whole = snapshot.extent_of_mesh(outer), &part = snapshot.extent_of_mesh(inner);
       const std::span<const std::uint32_t> vertices = components(inner);
       // The extents of meshes at poses are not the least ones: then the inner one may extend beyond the outer one.
-      const bool by_box = !placed && needs_box(inner, outer);
-      if (by_box ? !(within(part.low, whole) && within(part.high, whole)) : !overlap(part, whole)) return;
+      const bool connected = vertices.size() == 1;
+      if (connected && !placed ? !within(part, whole) : !overlap(part, whole)) return;
       Question& q = questions.emplace_back(gap, answer, 2 * i + (answer == Inside::b), inner, outer);
       for (std::uint32_t c = 0; c < vertices.size(); ++c)
         if (within(position(snapshot, placed, vertices[c]).data(), whole)) q.candidates.push_back(c);
-      if (q.candidates.empty()) questions.pop_back();
+      // Surfaces with ignored contacts may intersect unnoticed: then the answer must not depend on which boxes are
+      // known.
+      const bool least_decide = connected && placed && rules_.rule(inner, outer).filtered;
+      if (q.candidates.empty() ||
+          (least_decide && !within(least_extent(inner, snapshot, *placed), least_extent(outer, snapshot, *placed))))
+        questions.pop_back();
     };
     ask(Inside::a, gap.mesh_a, gap.mesh_b), ask(Inside::b, gap.mesh_b, gap.mesh_a);
   }

@@ -50,19 +50,14 @@ class Containment {
   }
   // Whether one mesh may lie inside another, as far as their boxes tell.
   bool possible(std::uint32_t inner, std::uint32_t outer, bool boxes_meet, bool within_box) const {
-    return closed_[outer] && (needs_box(inner, outer) ? within_box : boxes_meet);
+    return closed_[outer] && (components(inner).size() == 1 ? within_box : boxes_meet);
   }
 
   std::size_t bytes() const { return closed_.capacity() + 4 * (first_.capacity() + vertices_.capacity()); }
 
  private:
-  // Whether the first mesh is inside only if its box is inside that of the other. Meshes with ignored contacts may
-  // intersect unnoticed: then their vertices alone decide.
-  bool needs_box(std::uint32_t inner, std::uint32_t outer) const {
-    return components(inner).size() == 1 && !rules_.rule(inner, outer).filtered;
-  }
-
   struct Question;
+  Extent least_extent(std::uint32_t mesh, const MotionBounds& snapshot, const PlacedMeshes& placed) const;
   std::deque<Question> questions_of(std::span<Gap> gaps, const MotionBounds& snapshot,
                                     const PlacedMeshes* placed) const;
 
