@@ -5,13 +5,17 @@
 LONGEST = 200
 
 
-class MeshFileError(ValueError):
-    """A mesh file cannot be used. The message names the file, the problem and the remedy."""
-
-
 def printable(text: str) -> str:
     """The text with control characters, line ends and characters without an encoding escaped."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+class MeshFileError(ValueError):
+    """A mesh file cannot be used. The message names the file, the problem and the remedy, in one printable line: it may
+    quote the file."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(printable(text))
 
 
 def shortened(text: object, longest: int = LONGEST) -> str:

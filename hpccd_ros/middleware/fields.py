@@ -11,6 +11,7 @@ from array import array
 import numpy as np
 from builtin_interfaces.msg import Time
 
+from hpccd_ros.base.quoting import printable
 from hpccd_ros.frames.drops import Input, Reason, Rejection
 
 _NS = 1_000_000_000
@@ -21,7 +22,7 @@ class InvalidMessageError(ValueError):
     """An invalid message: ``reason`` for the counters; the text has the problem and the remedy."""
 
     def __init__(self, reason: Reason, text: str) -> None:
-        super().__init__(text)
+        super().__init__(printable(text))  # names in it are those of the message
         self.reason = reason
 
     def rejection(self, mesh: str, what: Input) -> Rejection:

@@ -13,7 +13,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.task import Future
 
-from hpccd_ros.base.quoting import LONGEST_MESSAGE, shortened
+from hpccd_ros.base.quoting import LONGEST_MESSAGE, printable, shortened
 from hpccd_ros.detect.core import CORE_ERRORS, Cancellation
 from hpccd_ros.detect.kept_detectors import KeptDetectors
 from hpccd_ros.middleware import topic_names
@@ -174,7 +174,7 @@ class DetectJobs:
         except RequestError:
             raise
         except CORE_ERRORS as error:
-            return self.reject(response, ticket, "failed", f"{type(error).__name__}: {error}")
+            return self.reject(response, ticket, "failed", printable(f"{type(error).__name__}: {error}"))
         if result.contacts is not None:
             response.contacts = result.contacts
         if result.distances is not None:

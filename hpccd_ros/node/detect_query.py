@@ -12,7 +12,7 @@ from hpccd.srv import Detect
 
 import hpccd_core as hc
 from hpccd_core import arguments
-from hpccd_ros.base.quoting import counted, not_one_of, shortened
+from hpccd_ros.base.quoting import counted, not_one_of, printable, shortened
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NONE, Separation
@@ -31,7 +31,10 @@ WRITING = DetectAction.Feedback.WRITING
 
 
 class RequestError(ValueError):
-    """An invalid request; the text says what to fix."""
+    """An invalid request; the text says what to fix, in one printable line: names in it are those of the request."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(printable(text))
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,10 @@ from hpccd_ros.params.table import (
 
 
 class ParameterError(ValueError):
-    """An invalid parameter; the text names it and the remedy."""
+    """An invalid parameter; the text names it and the remedy, in one printable line: names in it may be any."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(quoting.printable(text))
 
 
 def unusable_value(row: Row, value: Any) -> str | None:

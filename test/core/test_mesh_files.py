@@ -339,6 +339,15 @@ def test_any_changed_file_is_read_or_rejected():
                 pass
 
 
+def test_messages_are_one_printable_line(load):
+    """Names in a PLY header may be any."""
+    header = b"ply\nformat ascii 1.0\nelement a\x07\x9b 1\nproperty int x\nelement vertex 1\nproperty float x\n"
+    header += b"property float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_index\nend_header\n"
+    with pytest.raises(hc.MeshFileError, match=r"rows of a\\x07\\x9b") as caught:
+        load("a.ply", header)
+    assert str(caught.value).isprintable()
+
+
 def test_files_that_are_not_there(load, tmp_path, monkeypatch):
     with pytest.raises(hc.MeshFileError, match=r"none\.obj: no such file"):
         hc.load_mesh(str(tmp_path / "none.obj"))

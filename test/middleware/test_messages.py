@@ -199,6 +199,7 @@ def test_bad_clouds():
     read = mesh_messages.vertices_from_cloud
     assert "swap the bytes" in rejected(Reason.BIG_ENDIAN, read, cloud(POINTS, big=True), 100)
     assert "'z'" in rejected(Reason.MALFORMED, read, cloud(POINTS, names="xyw"), 100)
+    assert r"has x, y, w\n\x07" in rejected(Reason.MALFORMED, read, cloud(POINTS, names=["x", "y", "w\n\x07"]), 100)
     integers = cloud(POINTS, kinds=[F32, PointField.INT32, F32])
     assert "'y'" in rejected(Reason.UNSUPPORTED_TYPE, read, integers, 100)
     several = cloud(POINTS)
