@@ -10,18 +10,19 @@ import yaml
 
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import listed, printable, shortened
+from hpccd_ros.base.yaml_text import loaded
 
 # Characters: far above any that a person writes, far below a recording named by mistake.
 MOST = 1_000_000
 _PARAMETERS = "ros__parameters"
-# ValueError: no UTF-8, or what YAML takes for a date and is none. RecursionError: nested too deeply.
-_UNREADABLE = (yaml.YAMLError, ValueError, RecursionError)
+# UnicodeDecodeError and "no file" of `_text` are ValueErrors.
+_UNREADABLE = (yaml.YAMLError, ValueError)
 
 
 def read_parameters(path) -> dict[str, Any]:
     """{full name: value}, all nodes in the file taken together. Raises UserError that names `path`."""
     try:
-        tree = yaml.load(_text(Path(path)), _Loader)
+        tree = _tree(_text(Path(path)))
     except OSError as error:
         raise UserError(f"--params {path}: cannot be read: {error.strerror}") from error
     except _UNREADABLE as error:
@@ -45,7 +46,7 @@ def without_section(path, node: str) -> str:
     """The warning about a parameter file whose sections are all for other nodes, so that ROS ignores it; "": one is
     for the node of this full name, or the file has none."""
     try:
-        sections = list(_sections("", yaml.load(_text(Path(path)), _Loader)))
+        sections = list(_sections("", _tree(_text(Path(path)))))
     except (OSError, *_UNREADABLE):
         return ""  # ROS reports it
     if not sections or any(_matches(section, node) for section in sections):
@@ -59,8 +60,8 @@ def without_section(path, node: str) -> str:
 def value(text: str) -> Any:
     """What a parameter is given by ``text``, as ROS reads it: YAML, or the text itself where that has no such value."""
     try:
-        found = yaml.load(text, _Loader)
-    except (yaml.YAMLError, ValueError, RecursionError):
+        found = _tree(text)
+    except yaml.YAMLError:
         return text
     entries = found if isinstance(found, list) else [found]
     if not all(isinstance(entry, (bool, int, float, str)) for entry in entries):
@@ -81,7 +82,7 @@ def value(text: str) -> Any:
 def parameter_value(text: str) -> Any:
     """The value that ROS reads from `text` on a command line: YAML, or the text itself if it is none."""
     try:
-        return yaml.load(text, _Loader)
+        return _tree(text)
     except yaml.YAMLError:
         return text
 
@@ -118,6 +119,10 @@ def _flat(prefix: str, branch: dict) -> dict[str, Any]:
     for key, value in branch.items():
         found |= _flat(f"{prefix}{key}.", value) if isinstance(value, dict) else {f"{prefix}{key}": value}
     return found
+
+
+def _tree(text: str) -> Any:
+    return loaded(text, _Loader)
 
 
 class _Loader(yaml.SafeLoader):

@@ -19,6 +19,7 @@ from hpccd_ros.bag.decode import checked_type
 from hpccd_ros.bag.reader import RecordedTopic, Recording, RecordingError
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import counted, listed
+from hpccd_ros.base.yaml_text import loaded
 from hpccd_ros.middleware import environment, message_types, qos, ros_start, stop_signals, topic_names, transform_topics
 from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
 from hpccd_ros.replay import recorded_setup
@@ -108,8 +109,8 @@ def _offers(topic) -> list[dict]:
     try:
         if len(topic.offered_qos) > MOST_QOS:
             raise ValueError("too long")
-        offers = yaml.safe_load(topic.offered_qos) or []
-    except (yaml.YAMLError, ValueError, RecursionError):  # ValueError: something that YAML reads as an invalid date
+        offers = loaded(topic.offered_qos) or []
+    except (yaml.YAMLError, ValueError):
         offers = None
     if not isinstance(offers, list) or not all(isinstance(offer, dict) for offer in offers):
         why = "its quality of service is not stored as rosbag2 does"

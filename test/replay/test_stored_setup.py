@@ -175,7 +175,7 @@ def test_recordings_with_another_definition_are_not_played(changed, fewer):
     assert played.status == 2 and "another definition of hpccd/msg/MeshTopology" in played.err, played
 
 
-@pytest.mark.parametrize("qos", ["[", "x", "- 1", "{a: 1}", "2020-13-45", "[" * 10_000, "- null"])
+@pytest.mark.parametrize("qos", ["[", "x", "- 1", "{a: 1}", "2020-13-45", "[" * 10_000, "- null", "- !!bool x"])
 def test_quality_of_service_that_is_none(changed, qos):
     def edit(bag):
         bag.channels[0].metadata["offered_qos_profiles"] = qos
