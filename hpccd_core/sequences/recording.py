@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mesh_files.errors import shortened
+from .mcap_chunks import check_chunks
 from .numbering import missing_between
 from .packages import needed
 from .sequence import FrameSequence, SequenceError, SequenceMesh
@@ -85,12 +86,17 @@ class Recording(FrameSequence):
         summary = self._reader().get_summary()
         if summary is None:
             raise SequenceError(f"{self._path}: has no index; recover it with hpccd doctor --recover")
+        check_chunks(self._path, [chunk.chunk_start_offset for chunk in summary.chunk_indexes])
         types = {
             channel.topic: summary.schemas[channel.schema_id].name
             for channel in summary.channels.values()
             if channel.schema_id
         }
         self._check_inputs(list(types))
+        for schema in summary.schemas.values():
+            # The parser of definitions prints lines that it cannot read.
+            if schema.name in (_TOPOLOGY, _VERTICES) and not "".join(schema.data.decode().split()).isprintable():
+                raise SequenceError(f"{self._path}: the definition of {schema.name} is not text; record it again")
         found: list[_Recorded] = []
         for topic in sorted(name for name, kind in types.items() if kind == _VERTICES):
             topology = f"{topic.rpartition('/')[0]}/topology"

@@ -99,6 +99,11 @@ class _Reader:
                     raise SequenceError(f"{self._path}: has an unknown section {words[0][:40]!r}; export it again")
         if types is None:
             types = np.full(len(counts), POLYGON)
+        # Each by itself first: their sum may overflow.
+        if ((counts < 0) | (counts > len(corners))).any() or counts.sum() != len(corners):
+            raise SequenceError(
+                f"{self._path}: the numbers of corners of its cells do not add up to {len(corners)}; export it again"
+            )
         if len(types) != len(counts):
             raise SequenceError(f"{self._path}: has {len(types)} types of {len(counts)} cells; export it again")
         return Cells(points, corners, counts, types)

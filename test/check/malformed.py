@@ -434,6 +434,7 @@ mcap("mcap_cut_off", "recover it with hpccd doctor", lambda data: data[: len(dat
 mcap("mcap_of_two_coordinate_frames", "different coordinate frames", frame_ids=("world", "hand"))
 mcap("mcap_with_ropes", "edges of no face", edges=(0, 1))
 mcap("mcap_of_two_runs", "stamps of", backwards=True)
+mcap("mcap_with_an_escape", "is not text", lambda data: data.replace(b"uint64 step", b"uint64 \x1b[m "))
 mcap("mcap_without_topology", "has no topology of version 0", version=7)
 
 

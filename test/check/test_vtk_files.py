@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import hpccd_core as hc
+from hpccd_core import MeshFileError
 from hpccd_core.sequences import open_sequence
 
 # A triangle, a quad and a pentagon in one plane, and positions that float32 holds.
@@ -76,6 +77,22 @@ def test_the_boundary_of_tetrahedra(suffix, tmp_path):
         scene.add_mesh("a", faces)
         detector = hc.Detector(scene, threads=1)
         assert detector.winding_numbers(frame.vertices, [[0.25, 0.25, 0.25], [2, 2, 2]], "a")[0].tolist() == [1, 0]
+
+
+@pytest.mark.parametrize("offsets", [(0, 3, 2**33), (0, 3, 2), (1, 2, 6), (0, 2**62, 2**63 - 1)])
+def test_offsets_that_do_not_fit(offsets, tmp_path):
+    """Rejected before an array of their sizes is made: 1.7 GB for a file of 300 bytes."""
+    path = tmp_path / "a.vtk"
+    path.write_bytes(
+        b"# vtk DataFile Version 5.1\nt\nBINARY\nDATASET POLYDATA\nPOINTS 4 float\n"
+        + numbers(POINTS[:4], ">f4", True)
+        + b"\nPOLYGONS 3 6\nOFFSETS vtktypeint64\n"
+        + numbers(offsets, ">i8", True)
+        + b"\nCONNECTIVITY vtktypeint64\n"
+        + numbers([0, 1, 2, 0, 2, 3], ">i8", True)
+    )
+    with pytest.raises(MeshFileError, match="numbers of corners of its cells do not add up to 6; export it again"):
+        frame_of(path)
 
 
 def test_frames_of_a_folder(tmp_path):
