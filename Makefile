@@ -39,13 +39,15 @@ endif
 space := $(subst ,, )
 ENVIRONMENT := $(VENV)/.hpccd-environment$(if $(PYTHON),-$(subst /,-,$(PYTHON)))$(if \
   $(filter-out file,$(origin EXTRAS)),-$(subst $(space),+,$(EXTRAS)))
+COUNTED     := build/venv-coverage
 INSTALLED   := $(VENV)/.hpccd-installed
+LIST        := $(TREE)-sources.txt
 
 # Sources of the installed package.
 SOURCES := $(sort $(shell find CMakeLists.txt setup.py package.xml action cmake config launch msg srv scripts hpccd_ros hpccd_core \
   \( -name __pycache__ -o -name dist -o -path hpccd_core/tests \) -prune -o -type f -print))
 
-.PHONY: help venv demo bench test test-core test-python test-long test-gpu test-aarch64 sanitize fuzz oracle docs lint format release-check pin clean distclean \
+.PHONY: help venv demo bench test test-core test-python test-long test-gpu test-aarch64 sanitize coverage measure-coverage fuzz oracle docs lint format release-check pin clean distclean \
   FORCE
 
 help: ## Show this list of targets
@@ -93,6 +95,14 @@ test-aarch64: $(ENVIRONMENT) ## Run the C++ tests for aarch64 in an emulator (g+
 sanitize: $(ENVIRONMENT) ## Run the C++ tests under AddressSanitizer and UBSan, then ThreadSanitizer
 	@$(call run_core_tests,build/core-asan,-DCMAKE_BUILD_TYPE=RelWithDebInfo -DHPCCD_SANITIZE=address$(comma)undefined)
 	@$(call run_core_tests,build/core-tsan,-DCMAKE_BUILD_TYPE=RelWithDebInfo -DHPCCD_SANITIZE=thread)
+
+coverage: ## Run all tests in a second environment that counts lines; write build/coverage (an hour on two cores)
+	@$(MAKE) --no-print-directory VENV=$(COUNTED) EXTRAS="$(EXTRAS) coverage" HPCCD_CUDA=OFF \
+	  CMAKE_ARGS="$(CMAKE_ARGS) -DHPCCD_COVERAGE=ON" measure-coverage
+
+measure-coverage: venv oracle
+	@. $(VENV)/build.env; cmake --build $(TREE) --target hpccd_core_tests
+	$(BIN)/python scripts/measure_coverage.py --tree $(TREE) --jobs $(JOBS) -- --numprocesses $(TEST_JOBS) $(PYTEST_ARGS)
 
 bench: venv oracle ## Run one benchmark (BENCH_ARGS="scaling"; by default, list them)
 	PYTHONPATH=test $(BIN)/python -m bench $(BENCH_ARGS)
@@ -161,7 +171,7 @@ $(ENVIRONMENT): pyproject.toml scripts/create_venv.sh scripts/requirements.py $(
 	@PYTHON="$(PYTHON)" bash scripts/create_venv.sh $(VENV) $(EXTRAS)
 	@touch $@
 
-$(INSTALLED): $(ENVIRONMENT) $(SOURCES) build/sources.txt
+$(INSTALLED): $(ENVIRONMENT) $(SOURCES) $(LIST)
 	@echo "hpccd: building, and installing into $(VENV) (several minutes the first time)"
 	@. $(VENV)/build.env; tests=; if [ -d $(VENV)/src/gtest_vendor ]; then tests='$(GTEST)'; fi; \
 	  CMAKE_ARGS="-DHPCCD_CUDA=$(HPCCD_CUDA) $$tests $${CMAKE_ARGS:-}" \
@@ -170,7 +180,7 @@ $(INSTALLED): $(ENVIRONMENT) $(SOURCES) build/sources.txt
 	@touch $@
 
 # Changes when a source file is added or removed, or when options of CMake change.
-build/sources.txt: FORCE
+$(LIST): FORCE
 	@mkdir -p $(@D)
 	@printf '%s\n' '$(HPCCD_CUDA) $(CMAKE_ARGS)' $(SOURCES) | cmp -s - $@ || \
 	  printf '%s\n' '$(HPCCD_CUDA) $(CMAKE_ARGS)' $(SOURCES) > $@
