@@ -11,8 +11,9 @@ from pathlib import Path
 
 # Characters of the file's name in that of the hidden folder beside it.
 _SHOWN = 32
-# Errors of writing to an open file, which name none.
+# Errors of writing to an open file, which name none: of a full disk, and of a failing one.
 FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
+FAILING = (errno.EIO, errno.EINTR)
 
 
 def no_folder(path: str | Path) -> str:
@@ -30,8 +31,7 @@ def whole_file(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
     process leaves that folder. A device or a pipe is written to directly.
 
     Raises FileExistsError if `path` exists and may not be overwritten, FileNotFoundError if its folder does not exist.
-    An OSError about the place or a full disk names
-    `path`.
+    An OSError about the place, or of a full or failing disk, names `path`.
     """
     shown = str(path)
     target = Path(os.path.realpath(path))  # a link stays, and its file is replaced
@@ -63,12 +63,23 @@ def whole_file(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
         else:
             _move_to_free_name(draft, target)
     except OSError as error:
-        if own is None or str(error.filename or "").startswith(own) or error.errno in FULL:
+        unnamed = error.errno in FULL or (error.errno in FAILING and error.filename is None)
+        if own is None or str(error.filename or "").startswith(own) or unnamed:
             error.filename = shown
         raise
     finally:
         if folder is not None:
-            shutil.rmtree(folder, ignore_errors=True)
+            _remove(folder, folder / target.name)
+
+
+def _remove(folder: Path, draft: Path) -> None:
+    """Remove a folder with a file; what cannot be removed stays."""
+    with contextlib.suppress(OSError):
+        os.unlink(draft)  # in most cases the only file: neither this nor rmdir needs a free file descriptor
+    for remove in (os.rmdir, shutil.rmtree, shutil.rmtree):  # twice, because most errors do not last
+        with contextlib.suppress(OSError):
+            remove(folder)
+            return
 
 
 def _is_device(path: str | Path) -> bool:

@@ -167,3 +167,27 @@ def test_the_longest_names(tmp_path, name):
     with whole_file(tmp_path / name) as draft:
         draft.write_text("x")
     assert _names(tmp_path) == [name]
+
+
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EIO, errno.EINTR])
+def test_errors_of_an_open_file_name_it(tmp_path, code):
+    path = tmp_path / "run.png"
+    with pytest.raises(OSError) as raised, whole_file(path):
+        raise OSError(code, os.strerror(code))  # as of write and close
+    assert raised.value.filename == str(path) and not _names(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["unlink", "rmdir"])
+def test_an_error_that_does_not_last_leaves_no_folder(tmp_path, monkeypatch, name):
+    real, calls = getattr(os, name), []
+
+    def fails_once(*args, **kwargs):
+        calls.append(args)
+        if len(calls) == 1:
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        return real(*args, **kwargs)
+
+    monkeypatch.setattr(module.os, name, fails_once)
+    with whole_file(tmp_path / "run.png") as draft:
+        draft.write_text("new")
+    assert _names(tmp_path) == ["run.png"] and len(calls) > 1
