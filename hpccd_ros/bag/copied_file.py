@@ -7,6 +7,7 @@ from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from mcap.writer import Writer
 
 from hpccd_ros.bag.bag_file import COMPRESSIONS
+from hpccd_ros.bag.metadata_checksum import ROSBAG2_RECORD
 
 
 class CopiedFile:
@@ -50,7 +51,7 @@ class CopiedFile:
 
     def metadata(self, record: Metadata) -> None:
         """Add a metadata record, except that of rosbag2: its counts are those of the other file."""
-        if record.name != "rosbag2":
+        if record.name != ROSBAG2_RECORD:
             self._writer.add_metadata(record.name, dict(record.metadata))
 
     def attachment(self, record: Attachment) -> None:

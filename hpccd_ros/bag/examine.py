@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks an MCAP file record by record: its contents, and how much of a truncated or damaged one is readable."""
 
+import contextlib
 import dataclasses
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,8 +11,26 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Header, Message, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
-from hpccd_ros.bag.mcap_index import Descriptions, miscounted, misplaced, read_index, undescribed
-from hpccd_ros.bag.mcap_records import DAMAGE, Place, data_section, inside, parse, unpacked_message, within_chunk_times
+from hpccd_ros.bag.mcap_index import (
+    Descriptions,
+    miscounted,
+    misplaced,
+    misstated,
+    mistimed,
+    read_index,
+    undescribed,
+)
+from hpccd_ros.bag.mcap_records import (
+    DAMAGE,
+    Place,
+    data_section,
+    inside,
+    message_index,
+    opened,
+    parse,
+    unpacked_message,
+    within_chunk_times,
+)
 from hpccd_ros.bag.reader import RecordingError, stored_info
 from hpccd_ros.bag.writer import COMPRESSIONS
 
@@ -61,15 +80,19 @@ class _Walk:
 
     def __init__(self, path: Path, visit: Callable):
         self._visit = visit
-        try:
-            self.result = Examination(path, path.stat().st_size)
-            stream = open(path, "rb")
-        except OSError as error:
-            raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
         self._described = Descriptions(self._note)
         self._visited: dict[int, Channel] = {}
         self._counts: Counter[int] = Counter()
-        with stream:
+        self._in_data: set[tuple[type, int]] = set()  # kinds and numbers of descriptions
+        # Of the last chunk, what its message indexes contain, by channel; removed when found.
+        self._places: defaultdict[int, list[tuple[int, int]]] = defaultdict(list)
+        self._has_indexes = False
+        with contextlib.ExitStack() as stack:
+            try:
+                self.result = Examination(path, path.stat().st_size)
+                stream = stack.enter_context(opened(path))
+            except OSError as error:
+                raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
             self._walk(stream)
 
     def _walk(self, stream):
@@ -92,7 +115,13 @@ class _Walk:
         elif result.finished and index is not None and not result.damaged_chunks:
             result.readable = result.size
             counts = self._counts
-            for why in (misplaced(index, places), undescribed(index, counts), miscounted(index, counts)):
+            for why in (
+                misplaced(index, places),
+                undescribed(index, counts),
+                miscounted(index, counts),
+                mistimed(index, result.start, result.end) if counts else None,
+                misstated(index, places),
+            ):
                 if why:
                     self._note(why)
 
@@ -112,11 +141,17 @@ class _Walk:
         if raw.at != len(MCAP0_MAGIC) and raw.opcode == Opcode.HEADER:
             self._note(f"a header at byte {raw.at:,}")
         try:
+            if raw.opcode == Opcode.MESSAGE_INDEX:
+                self._check_message_index(raw)
+            elif self._has_indexes and self._places:
+                self._note(f"an index of messages is missing before byte {raw.at:,}")
+                self._has_indexes = False
             record = parse(raw)
             if isinstance(record, Chunk):
                 result.chunks += 1
+                self._places, self._has_indexes = defaultdict(list), False
                 result.compression = record.compression if record.compression in COMPRESSIONS else "none"
-                for item in inside(record):
+                for item in inside(record, self._places):
                     if not within_chunk_times(record, item):
                         self._note(f"the chunk at byte {raw.at:,} has a message outside of its times")
                     yield item
@@ -126,6 +161,12 @@ class _Walk:
             # The frame of the record is complete, so later ones can be read.
             result.damaged_chunks += raw.opcode == Opcode.CHUNK
             self._note(_text(error))
+
+    def _check_message_index(self, raw):
+        channel, entries = message_index(raw)
+        self._has_indexes = True
+        if sorted(self._places.pop(channel, [])) != sorted(entries):
+            self._note(f"the index of messages at byte {raw.at:,} does not match its chunk")
 
     def _read_index(self, stream):
         """(index or None, where the data must end, why there is none). The index may describe a damaged chunk."""
@@ -148,10 +189,18 @@ class _Walk:
             result.profile, result.library = result.profile or record.profile, result.library or record.library
         if isinstance(record, (Schema, Channel)):
             self._described.add(record)
+            self._in_data.add((type(record), record.id))
+            if isinstance(record, Channel) and record.schema_id:
+                self._need(Schema, record.schema_id, f"schema {record.schema_id} is not described before its channels")
         elif isinstance(record, Message):
             self._visit_message(record)
         elif self._is_readable(record):
             self._visit(record)
+
+    def _need(self, kind, number, otherwise) -> None:
+        # The index may describe it too, but other readers go through the data in order.
+        if (kind, number) not in self._in_data:
+            self._note(otherwise)
 
     def _is_readable(self, record) -> bool:
         try:
@@ -170,6 +219,7 @@ class _Walk:
         channel = self._described.channels[number]
         if self._visited.get(number) is not channel:
             self._visited[number] = channel
+            self._need(Channel, number, f"channel {number} is not described before its first message")
             if channel.schema_id in self._described.schemas:
                 self._visit(self._described.schemas[channel.schema_id])
                 result.types[channel.topic] = self._described.schemas[channel.schema_id].name

@@ -17,7 +17,16 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.summary import Summary
 
-from hpccd_ros.bag.mcap_index import Descriptions, miscounted, misplaced, read_index, stored_counts, undescribed
+from hpccd_ros.bag.mcap_index import (
+    Descriptions,
+    miscounted,
+    misplaced,
+    misstated,
+    mistimed,
+    read_index,
+    stored_counts,
+    undescribed,
+)
 from hpccd_ros.bag.mcap_records import (
     Place,
     Raw,
@@ -65,7 +74,7 @@ class McapFile:
         if begin != end:
             raise McapError(f"the data ends at byte {end:,}, but according to the footer at {begin:,}")
         self._index = index or Summary()
-        if why := misplaced(self._index, places):
+        if why := misplaced(self._index, places) or misstated(self._index, places):
             raise McapError(why)
         described = self._indexed()
         counts = stored_counts(self._index)
@@ -82,6 +91,8 @@ class McapFile:
         for record in (*self.schemas.values(), *self.channels.values()):
             described.add(record)
         counts: Counter[int] = Counter()
+        first, last = 2**64, -1
+        in_data = {record.id for _, record in self._loose if isinstance(record, known.Channel)}
         waiting = list(self._places)
         heapq.heapify(waiting)
         held = 0
@@ -94,17 +105,25 @@ class McapFile:
             for number, record in enumerate(self._records_at(thing)):
                 if not isinstance(record, known.Message):
                     described.add(record)
+                    if isinstance(record, known.Channel):
+                        in_data.add(record.id)
                     continue
                 self._check_described(described, record)
                 counts[record.channel_id] += 1
+                if record.log_time < first:  # min and max would take longer
+                    first = record.log_time
+                if record.log_time > last:
+                    last = record.log_time
                 if record.channel_id in wanted:
                     record = unpacked_message(described.channels[record.channel_id], record)
                     heapq.heappush(waiting, _Waiting(record.log_time, at, number, record))
                     held += len(record.data) + _OF_A_MESSAGE
                     if held > MOST_WAITING:
                         raise McapError(f"messages of {held:,} bytes are not in the order of their times")
-        if why := miscounted(self._index, counts):
+        if why := miscounted(self._index, counts) or (counts and mistimed(self._index, first, last)):
             raise McapError(why)
+        if only_indexed := set(counts) - in_data:
+            raise McapError(f"channel {min(only_indexed)} is described in the index only")
 
     def _indexed(self) -> Descriptions:
         described = Descriptions(_complain)

@@ -3,6 +3,7 @@
 
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterable
 
 from mcap import records as known
@@ -77,6 +78,8 @@ def _summary(raws) -> Summary:
         if isinstance(record, (known.Schema, known.Channel)):
             described.add(record)
         elif isinstance(record, known.Statistics):
+            if summary.statistics is not None:
+                complain("the statistics are there twice")
             summary.statistics = record
         elif type(record) in lists:
             lists[type(record)].append(record)
@@ -88,29 +91,65 @@ def _summary(raws) -> Summary:
 
 
 def misplaced(summary: Summary, data: list[Place]) -> str | None:
-    """How the positions in the index differ from those in the `data`, or None.
+    """How the index differs from the records of the `data`, in position or content, or None.
 
-    An index may have no positions of a kind.
+    An index may lack all records of a kind, or the positions of message indexes.
     """
     for opcode, name, indexed in (
-        (Opcode.CHUNK, "chunk", [(i.chunk_start_offset, i.chunk_length) for i in summary.chunk_indexes]),
-        (Opcode.ATTACHMENT, "attachment", [(i.offset, i.length) for i in summary.attachment_indexes]),
-        (Opcode.METADATA, "metadata record", [(i.offset, i.length) for i in summary.metadata_indexes]),
+        (Opcode.CHUNK, "chunk", [_of_chunk(i) for i in summary.chunk_indexes]),
+        (Opcode.ATTACHMENT, "attachment", [_of_attachment(i) for i in summary.attachment_indexes]),
+        (Opcode.METADATA, "metadata record", [(i.offset, i.length, i.name) for i in summary.metadata_indexes]),
     ):
-        there = [(place.at, place.length) for place in data if place.opcode == opcode]
+        there = [(place.at, place.length, *place.content) for place in data if place.opcode == opcode]
         if indexed and sorted(indexed) != there:
             wrong = sorted(set(indexed).symmetric_difference(there)) or indexed
             return f"the index is wrong about the {name} at byte {wrong[0][0]:,}"
+    by_chunk = _message_indexes(data)
+    for index in summary.chunk_indexes:
+        indexed = index.message_index_offsets, index.message_index_length
+        if indexed not in (({}, 0), by_chunk[index.chunk_start_offset]):
+            return f"the index is wrong about the message indexes of the chunk at byte {index.chunk_start_offset:,}"
     return None
 
 
-def undescribed(summary: Summary, channels: Iterable[int]) -> str | None:
-    """The first of the `channels` with messages that the index lacks, in words, or None.
+def _of_chunk(index: known.ChunkIndex) -> tuple:
+    place = index.chunk_start_offset, index.chunk_length
+    times = index.message_start_time, index.message_end_time
+    return *place, *times, index.compression, index.compressed_size, index.uncompressed_size
 
-    An index may have no channels.
+
+def _of_attachment(index: known.AttachmentIndex) -> tuple:
+    times = index.log_time, index.create_time
+    return index.offset, index.length, *times, index.name, index.media_type, index.data_size
+
+
+def _message_indexes(data: list[Place]) -> dict[int, tuple[dict[int, int], int]]:
+    """Position of a chunk -> ({channel: position of its message index}, size of all these)."""
+    found: dict[int, tuple[dict[int, int], int]] = {}
+    offsets: dict[int, int] = {}
+    chunk, size = 0, 0
+    for place in data:
+        if place.opcode == Opcode.CHUNK:
+            chunk, size, offsets = place.at, 0, {}
+        elif place.opcode == Opcode.MESSAGE_INDEX and place.content:
+            offsets[place.content[0]] = place.at
+            size += place.length
+        found[chunk] = offsets, size
+    return found
+
+
+def undescribed(summary: Summary, channels: Iterable[int]) -> str | None:
+    """The first of the `channels` with messages that the index lacks, or whose schema it lacks, in words, or None.
+
+    An index may have no channels, and no schemas.
     """
-    missing = next((number for number in channels if summary.channels and number not in summary.channels), None)
-    return None if missing is None else f"the index does not describe channel {missing}"
+    for number in channels if summary.channels else ():
+        if number not in summary.channels:
+            return f"the index does not describe channel {number}"
+        schema = summary.channels[number].schema_id
+        if summary.schemas and schema and schema not in summary.schemas:
+            return f"the index does not describe schema {schema}"
+    return None
 
 
 def stored_counts(summary: Summary) -> dict[int, int] | None:
@@ -138,3 +177,31 @@ def miscounted(summary: Summary, counts: dict[int, int]) -> str | None:
         return f"the index lists {summary.statistics.message_count:,} messages, the file has {sum(counts.values()):,}"
     listed = f"{indexed.get(where, 0):,} messages of channel {where}"
     return f"the index lists {listed}, the file has {counts.get(where, 0):,}"
+
+
+def mistimed(summary: Summary, first: int, last: int) -> str | None:
+    """That the statistics of the index have other times than ``first`` and ``last``, the smallest and largest log time
+    of the messages, or None."""
+    statistics = summary.statistics
+    if statistics is None or (statistics.message_start_time, statistics.message_end_time) == (first, last):
+        return None
+    return "the index is wrong about the time of the first or last message"
+
+
+def misstated(summary: Summary, data: list[Place]) -> str | None:
+    """How the numbers of records in the statistics of the index differ from the `data`, or None.
+
+    Not compared: schemas and channels, because recorders count repeated descriptions differently.
+    """
+    statistics = summary.statistics
+    if statistics is None:
+        return None
+    found = Counter(place.opcode for place in data)
+    for name, listed, there in (
+        ("chunks", statistics.chunk_count, found[Opcode.CHUNK]),
+        ("attachments", statistics.attachment_count, found[Opcode.ATTACHMENT]),
+        ("metadata records", statistics.metadata_count, found[Opcode.METADATA]),
+    ):
+        if listed != there:
+            return f"the index lists {listed:,} {name}, the file has {there:,}"
+    return None

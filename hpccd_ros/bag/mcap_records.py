@@ -5,12 +5,15 @@ The reader of the library `mcap` trusts them: it reads into the next record if a
 data at the end of the file, and unpacks a chunk to any size.
 """
 
+import contextlib
 import dataclasses
 import struct
 import zlib
+from collections import defaultdict
 from collections.abc import Iterator
 from io import BytesIO
-from typing import NamedTuple
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
 
 import lz4.frame
 import zstandard
@@ -20,6 +23,8 @@ from mcap.exceptions import EndOfFile, McapError, UnsupportedCompressionError
 from mcap.opcode import Opcode
 from mcap.stream_reader import CRCValidationError
 from mcap.writer import MCAP0_MAGIC
+
+from hpccd_ros.bag import metadata_checksum
 
 # Errors from reading truncated or flipped bytes: the above, decompressors (lz4: RuntimeError), text that is not UTF-8
 # (a ValueError), a disk that cannot be read.
@@ -44,7 +49,8 @@ ZSTD = b"\x28\xb5\x2f\xfd"
 
 _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
-_INDEX_HEAD, _INDEX_ENTRY = struct.Struct("<HI"), 16
+_INDEX_HEAD, _INDEX_ENTRY = struct.Struct("<HI"), struct.Struct("<QQ")
+_CHUNK_HEAD, _CHUNK_SIZE = struct.Struct("<QQQII"), struct.Struct("<Q")
 _KINDS = {
     Opcode.HEADER: known.Header,
     Opcode.FOOTER: known.Footer,
@@ -62,11 +68,12 @@ _KINDS = {
 
 
 class Place(NamedTuple):
-    """Position of a complete record in a file."""
+    """Position of a complete record in a file. content: what an index repeats of it."""
 
     opcode: int
     at: int
     length: int
+    content: tuple = ()
 
 
 class Raw(NamedTuple):
@@ -78,7 +85,18 @@ class Raw(NamedTuple):
 
     @property
     def place(self) -> Place:
-        return Place(self.opcode, self.at, _HEAD.size + len(self.body))
+        return Place(self.opcode, self.at, _HEAD.size + len(self.body), _content(self))
+
+
+@contextlib.contextmanager
+def opened(path: Path) -> Iterator[BinaryIO]:
+    """A file to read. Raises OSError if it cannot be opened; errors of closing it mean nothing."""
+    stream = open(path, "rb")
+    try:
+        yield stream
+    finally:
+        with contextlib.suppress(OSError):
+            stream.close()
 
 
 def records(stream, begin: int, end: int) -> Iterator[Raw]:
@@ -131,6 +149,8 @@ def parse(raw: Raw) -> known.McapRecord | None:
     if kind is None:
         return None
     record = kind.read(_Whole(raw.body))
+    if isinstance(record, known.Metadata):
+        metadata_checksum.check(record)
     if isinstance(record, known.Attachment):
         # All except its own four bytes, which the library skips.
         stored, found = int.from_bytes(raw.body[-4:], "little"), zlib.crc32(raw.body[:-4])
@@ -139,8 +159,13 @@ def parse(raw: Raw) -> known.McapRecord | None:
     return record
 
 
-def inside(chunk: known.Chunk) -> Iterator[known.Schema | known.Channel | known.Message]:
-    """The records of a chunk, whose checksum is verified. Raises the errors in DAMAGE."""
+def inside(
+    chunk: known.Chunk, places: defaultdict[int, list[tuple[int, int]]] | None = None
+) -> Iterator[known.Schema | known.Channel | known.Message]:
+    """The records of a chunk, whose checksum is verified. Raises the errors in DAMAGE.
+
+    places: gets what indexes of its messages contain, as from `message_index`.
+    """
     data = memoryview(_unpacked(chunk))
     at = 0
     for _ in range(MOST_RECORDS):
@@ -151,7 +176,10 @@ def inside(chunk: known.Chunk) -> Iterator[known.Schema | known.Channel | known.
         if length > len(data) - at:
             raise EndOfFile(f"a record of {length:,} bytes in a chunk with {len(data) - at:,} left")
         if opcode in (Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL):
-            yield parse(Raw(opcode, 0, bytes(data[at : at + length])))
+            record = parse(Raw(opcode, 0, bytes(data[at : at + length])))
+            if places is not None and opcode == Opcode.MESSAGE:
+                places[record.channel_id].append((record.log_time, at - _HEAD.size))
+            yield record
         at += length
     raise McapError(f"a chunk of more than {MOST_RECORDS:,} records")
 
@@ -169,8 +197,7 @@ def unpacked_message(channel: known.Channel, message: known.Message) -> known.Me
     size = zstandard.frame_content_size(message.data)
     if not 0 <= size <= MOST_UNPACKED:
         raise McapError(f"a compressed message of {size:,} bytes; the limit is {MOST_UNPACKED:,}")
-    with zstandard.ZstdDecompressor().stream_reader(message.data) as reader:
-        data = reader.read(size + 1)
+    data = zstandard.ZstdDecompressor().decompress(message.data, max_output_size=size + 1)
     if len(data) != size:
         raise McapError(f"a compressed message of {size:,} bytes unpacks to {len(data):,}")
     return dataclasses.replace(message, data=data)
@@ -182,10 +209,15 @@ def _unpacked(chunk) -> bytes:
         raise McapError(f"a chunk of {size:,} bytes, more than {MOST_UNPACKED:,}")
     # One byte more than declared is enough to find that it is wrong.
     if chunk.compression == "zstd":
-        with zstandard.ZstdDecompressor().stream_reader(chunk.data) as reader:
-            data = reader.read(size + 1)
+        if zstandard.frame_content_size(chunk.data) > size:
+            raise McapError(f"a chunk of {size:,} bytes unpacks to more")
+        # In one piece: a stream does not notice that the end is missing, and other readers reject it.
+        data = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=size + 1)
     elif chunk.compression == "lz4":
-        data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
+        decompressor = lz4.frame.LZ4FrameDecompressor()
+        data = decompressor.decompress(chunk.data, max_length=size + 1)
+        if len(data) == size and not decompressor.eof:
+            raise McapError("a chunk whose compressed data has no end")
     elif chunk.compression == "":
         data = chunk.data
     else:
@@ -197,10 +229,38 @@ def _unpacked(chunk) -> bytes:
     return data
 
 
+def _content(raw: Raw) -> tuple:
+    """What an index repeats of a record: of a chunk its times, sizes and compression."""
+    body = raw.body
+    try:
+        if raw.opcode == Opcode.CHUNK:
+            start, end, size, _, length = _CHUNK_HEAD.unpack_from(body)
+            (packed,) = _CHUNK_SIZE.unpack_from(body, _CHUNK_HEAD.size + length)
+            return start, end, str(body[_CHUNK_HEAD.size :][:length], "utf-8"), packed, size
+        if raw.opcode == Opcode.MESSAGE_INDEX:
+            return (_INDEX_HEAD.unpack_from(body)[0],)
+        if raw.opcode == Opcode.METADATA:
+            return (_Whole(body).read_prefixed_string(),)
+        if raw.opcode == Opcode.ATTACHMENT:
+            stream = _Whole(body)
+            times = stream.read8(), stream.read8()
+            return (*times, stream.read_prefixed_string(), stream.read_prefixed_string(), stream.read8())
+    except DAMAGE:
+        pass  # `parse` raises it
+    return ()
+
+
+def message_index(raw: Raw) -> tuple[int, list[tuple[int, int]]]:
+    """(channel, [(log time, position in the chunk)]) of an index of messages. Raises the errors in DAMAGE."""
+    _check_message_index(raw.body)
+    channel, size = _INDEX_HEAD.unpack_from(raw.body)
+    return channel, list(_INDEX_ENTRY.iter_unpack(raw.body[_INDEX_HEAD.size :][:size]))
+
+
 def _check_message_index(body: bytes) -> None:
     # Not needed here, but other readers fail on an incomplete one.
     entries = _INDEX_HEAD.unpack_from(body)[1]
-    if entries % _INDEX_ENTRY or entries > len(body) - _INDEX_HEAD.size:
+    if entries % _INDEX_ENTRY.size or entries > len(body) - _INDEX_HEAD.size:
         raise EndOfFile(f"an index of messages of {entries:,} bytes, {len(body) - _INDEX_HEAD.size:,} are left")
 
 

@@ -13,8 +13,8 @@ from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from hpccd_ros.bag.mcap_file import McapFile
-from hpccd_ros.bag.mcap_records import DAMAGE, ZSTD
-from hpccd_ros.bag.writer import HPCCD_RECORD
+from hpccd_ros.bag.mcap_records import DAMAGE, ZSTD, opened
+from hpccd_ros.bag.metadata_checksum import HPCCD_RECORD
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import listed, printable
 
@@ -137,7 +137,7 @@ class Recording:
     def _open(self, path) -> McapFile:
         check_ends(path)
         with _explained(path):
-            stream = self._stack.enter_context(open(path, "rb"))
+            stream = self._stack.enter_context(opened(path))
             file = McapFile(stream, path.stat().st_size)
         for number, channel in file.channels.items():
             schema = file.schemas.get(channel.schema_id)
@@ -210,14 +210,17 @@ def stored_info(record: Metadata) -> dict | None:
 
 def recording_files(path: Path) -> list[Path]:
     """The .mcap files of a recording, in order. Raises RecordingError if there is none, or something else."""
-    files = _files_of_folder(path) if path.is_dir() else [path]
-    for file in files:
-        if not file.exists():
-            raise RecordingError(f"{file} does not exist")
-        # A pipe, device or socket may never return data, and cannot be read twice.
-        if not file.is_file():
-            raise RecordingError(f"{file} is not a regular file: copy the recording into one")
-        _check_format(file)
+    try:
+        files = _files_of_folder(path) if path.is_dir() else [path]
+        for file in files:
+            if not file.exists():
+                raise RecordingError(f"{file} does not exist")
+            # A pipe, device or socket may never return data, and cannot be read twice.
+            if not file.is_file():
+                raise RecordingError(f"{file} is not a regular file: copy the recording into one")
+            _check_format(file)
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
     return files
 
 
@@ -237,7 +240,7 @@ _PACKED = "is compressed as whole files (`ros2 bag record --compression-mode fil
 def _check_format(file: Path) -> None:
     """Raise RecordingError for other formats of rosbag2, with the command that converts them."""
     try:
-        with open(file, "rb") as stream:
+        with opened(file) as stream:
             begin = stream.read(16)
     except OSError:
         return  # reading it raises the error
@@ -263,7 +266,7 @@ def _split_number(path: Path):
 def check_ends(path: Path) -> None:
     """Raise RecordingError if `path` does not begin like an MCAP file, or does not end like a finished one."""
     try:
-        with open(path, "rb") as stream:
+        with opened(path) as stream:
             begin = stream.read(len(MCAP0_MAGIC))
             size = stream.seek(0, 2)
             stream.seek(max(0, size - len(MCAP0_MAGIC)))

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write MCAP recordings that rosbag2 accepts: profile ros2, CDR messages, ros2msg schemas, bag metadata."""
 
+import contextlib
+import math
 import os
 import textwrap
 import time
@@ -8,9 +10,10 @@ from collections import Counter
 from pathlib import Path
 
 from hpccd_ros.bag import message_definitions, qos_yaml
-from hpccd_ros.bag.bag_file import COMPRESSIONS, HPCCD_RECORD, BagFile, Topic
+from hpccd_ros.bag.bag_file import COMPRESSIONS, BagFile, Topic
+from hpccd_ros.bag.disk_sync import DiskSync, sync_folder
 
-__all__ = ["COMPRESSIONS", "HPCCD_RECORD", "BagWriter", "Topic"]
+__all__ = ["COMPRESSIONS", "BagWriter", "Topic"]
 
 
 class BagWriter:
@@ -24,6 +27,8 @@ class BagWriter:
     chunk_size: bytes of messages after which a chunk is closed, indexed and written.
     flush_interval: seconds after which an open chunk is closed anyway. A process killed at any moment
     loses at most the messages of the open chunk, those of the last `flush_interval`.
+    sync: whatever is written survives a power failure too. Each time that an open chunk is older than `flush_interval`,
+    and at the end, the file is made durable (fdatasync, fsync of its folder), in a thread of its own.
     max_bytes, max_seconds: split limits (0: none), for a folder only. `max_bytes` counts messages
     before compression, and the last one of a file may exceed it.
 
@@ -32,7 +37,11 @@ class BagWriter:
     complete chunk, lost messages are counted, and after `retry_interval` seconds a new file is tried: the next number
     of the folder, or NAME-1.mcap beside NAME.mcap.
 
-    write_errors, last_error: errors of the disk. not_written: messages by topic that are in no file.
+    If a file cannot be made durable, it is closed as it is, without index, and the next one begins at once, or after
+    `retry_interval` seconds if such an error happened shortly before.
+
+    write_errors, last_error: errors of the disk. not_written: messages by topic that are in no file. not_synced: number
+    of messages that were written, but could not be made durable.
     """
 
     def __init__(
@@ -47,6 +56,7 @@ class BagWriter:
         max_bytes=0,
         max_seconds=0.0,
         retry_interval=5.0,
+        sync=False,
     ):
         self.path = Path(path)
         self.single_file = self.path.suffix == ".mcap"
@@ -54,9 +64,9 @@ class BagWriter:
             raise ValueError(why)
         if self.path.exists():
             raise FileExistsError(f"{self.path} exists: recordings are not overwritten; remove it or name another")
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        if not self.single_file:
-            self.path.mkdir()
+        folders = _missing_folders(self.path.parent if self.single_file else self.path)
+        for folder in folders:
+            folder.mkdir(exist_ok=folder != self.path)
         self._options = {
             "info": info or {},
             "attachments": list(attachments),
@@ -71,11 +81,28 @@ class BagWriter:
         self._listed: list[tuple[str, str]] = []  # parts of metadata.yaml of finished files
         self._file: BagFile | None = None  # None: after an error, until the next try
         self._try_again = 0.0
+        self._last_sync_error = -math.inf
+        self._unlisted = False  # the last metadata.yaml could not be written
         self._closed = False
         self.write_errors = 0
         self.last_error = ""
         self.not_written: Counter[str] = Counter()
-        self._open_file()
+        self.not_synced = 0
+        self._disk = DiskSync() if sync else None
+        try:
+            if sync:
+                for folder in folders:
+                    sync_folder(folder.parent)
+            self._open_file()
+        except OSError as error:
+            error.filename = error.filename or str(self.path)
+            self._abandon_file()
+            if self._disk is not None:
+                self._disk.end()
+            if not self.single_file:
+                with contextlib.suppress(OSError):
+                    self.path.rmdir()
+            raise
 
     def add_topic(self, topic: Topic) -> None:
         """Announce a topic before its first message. Raises LookupError if its type is not installed."""
@@ -97,6 +124,8 @@ class BagWriter:
 
     def write(self, topic_name: str, data: bytes, log_time: int, publish_time: int, sequence: int = 0) -> None:
         """Append the CDR bytes of one message; times in ns since the epoch."""
+        if self._disk is not None:
+            self._take_sync_errors()
         topic = self._topics[topic_name]
         message = (log_time, publish_time, sequence, data)
         if self._file is None and time.monotonic() >= self._try_again:
@@ -111,21 +140,40 @@ class BagWriter:
         topic.last.append(message)
 
     def poll(self) -> None:
-        """Close the open chunk if it is older than `flush_interval`. Call it also while no messages come."""
+        """Close the open chunk if it is older than `flush_interval`. Call it also while no messages come, after
+        `until_flush` seconds at the latest."""
+        if self._disk is not None:
+            self._take_sync_errors()
         if time.monotonic() - self._flushed > self._flush_interval:
             self.flush()
+
+    @property
+    def until_flush(self) -> float:
+        """Seconds until `poll` closes the open chunk, at least 0; inf if it is empty."""
+        if self._file is None or not self._file.open_chunk:
+            return math.inf
+        return max(0.0, self._flushed + self._flush_interval - time.monotonic())
 
     def flush(self) -> None:
         """Write everything so far, so that it survives the end of this process."""
         if self._file is not None:
             self._guarded(self._file.flush)
+        if self._disk is not None and self._file is not None and self._file.flushed_count > self._file.to_sync:
+            self._disk.written(self._file, self._file.flushed_count)
         self._flushed = time.monotonic()
 
     def close(self) -> None:
         """Finish the last file: index, statistics, footer. The recording is then complete."""
         self._closed = True
+        if self._disk is not None:
+            self._take_sync_errors()
         if self._file is not None:
             self._guarded(self._close_file)
+        elif self._unlisted:
+            self._guarded(self._list_files)
+        if self._disk is not None:
+            self._disk.end()
+            self._take_sync_errors()
 
     @property
     def failing(self) -> bool:
@@ -139,7 +187,12 @@ class BagWriter:
     @property
     def flushed_count(self) -> int:
         """Messages that survive the end of this process."""
-        return sum(file.message_count - file.open_chunk.total() for file in self._files)
+        return sum(file.flushed_count for file in self._files)
+
+    @property
+    def synced_count(self) -> int:
+        """Messages that survive a power failure; 0 without `sync`."""
+        return sum(file.synced_count for file in self._files)
 
     @property
     def file_paths(self) -> list[Path]:
@@ -148,7 +201,7 @@ class BagWriter:
     @property
     def torn_files(self) -> list[Path]:
         """Files that were ended by an error."""
-        return [file.path for file in self._files if not file.finished and file is not self._file]
+        return [file.path for file in self._files if file.torn]
 
     @property
     def size(self) -> int:
@@ -160,16 +213,41 @@ class BagWriter:
         try:
             action()
         except OSError as error:
-            self.write_errors += 1
-            self.last_error = f"{error.strerror}: {error.filename or (self._file and self._file.path) or self.path}"
+            self._count(error)
             self._try_again = time.monotonic() + self._retry_interval
-            file, self._file = self._file, None
-            if file is None:
-                return
-            self.not_written += file.open_chunk
-            file.abandon()
-            if not file.message_count:
-                self._files.remove(file)
+            if (file := self._abandon_file()) is not None and self._disk is not None:
+                self._disk.finished(file, file.message_count)  # what was written before the error
+
+    def _count(self, error: OSError) -> None:
+        self.write_errors += 1
+        self.last_error = f"{error.strerror}: {error.filename or (self._file and self._file.path) or self.path}"
+
+    def _abandon_file(self) -> BagFile | None:
+        """The current file, ended as it is; None if there is none, or if it had no messages and is removed."""
+        file, self._file = self._file, None
+        if file is None:
+            return None
+        self.not_written += file.open_chunk
+        if file.abandon():
+            return file
+        self._files.remove(file)
+        return None
+
+    def _take_sync_errors(self) -> None:
+        """Count files that could not be made durable. The current one is ended: what it contains is not known."""
+        while self._disk.failures:
+            file, error = self._disk.failures.popleft()
+            self._count(error)
+            if file.finished:  # it is durable, metadata.yaml is not
+                continue
+            now = time.monotonic()
+            if file is self._file:
+                self._abandon_file()
+                recently = now - self._last_sync_error < self._retry_interval
+                self._try_again = now + self._retry_interval if recently else now
+            self._last_sync_error = now
+            file.torn = True
+            self.not_synced += file.flushed_count - file.synced_count
 
     def _next_path(self) -> Path:
         if self.single_file:
@@ -183,15 +261,29 @@ class BagWriter:
         self._file = BagFile(self._next_path(), **self._options)
         self._files.append(self._file)
         self._flushed = time.monotonic()
+        if self._disk is not None:
+            self._disk.opened(self._file)
 
     def _close_file(self):
-        self._file.finish(metadata_of_bag([self._file], list(self._topics.values())))
+        file = self._file
+        file.finish(metadata_of_bag([file], list(self._topics.values())))
         self._file = None
+        if self._disk is not None:
+            self._disk.finished(file, file.message_count, lambda: self._complete(file))
+            return
+        try:
+            self._complete(file)
+        except OSError as error:  # of metadata.yaml: the recording goes on
+            self._count(error)
+
+    def _complete(self, file):
+        file.finished = True
         if not self.single_file:
             self._list_files()
 
     def _list_files(self):
-        finished = [file for file in self._files if file.finished]
+        self._unlisted = True
+        finished = [file for file in list(self._files) if file.finished]
         # Earlier ones are already rendered: rendering all of them again takes longer at each split, and messages of the
         # stream would be lost meanwhile.
         for file in finished[len(self._listed) :]:
@@ -201,8 +293,21 @@ class BagWriter:
         bag = {"rosbag2_bagfile_information": metadata_without_files(finished, list(self._topics.values()))}
         lists = f"  relative_file_paths:\n{names}  files:\n{files}"
         draft = self.path / "metadata.yaml.part"
-        draft.write_text(qos_yaml.to_yaml(bag) + lists, encoding="utf-8")
-        os.replace(draft, self.path / "metadata.yaml")  # complete at any moment
+        try:
+            with open(draft, "w", encoding="utf-8") as stream:
+                stream.write(qos_yaml.to_yaml(bag) + lists)
+                if self._disk is not None:
+                    stream.flush()
+                    os.fsync(stream.fileno())
+            os.replace(draft, self.path / "metadata.yaml")  # complete at any moment
+        except OSError as error:
+            error.filename = str(self.path / "metadata.yaml")
+            with contextlib.suppress(OSError):
+                draft.unlink()
+            raise
+        if self._disk is not None:
+            sync_folder(self.path)
+        self._unlisted = False
 
     def _split(self, log_time, cause):
         self._close_file()
@@ -237,6 +342,15 @@ def unusable_options(path, compression: str, max_bytes: float, max_seconds: floa
     if compression not in COMPRESSIONS:
         return f"compression {compression!r} is none of {', '.join(COMPRESSIONS)}"
     return None
+
+
+def _missing_folders(folder: Path) -> list[Path]:
+    """``folder`` and those on the way to it that do not exist, in the order in which they can be made."""
+    missing = []
+    while not folder.exists():
+        missing.append(folder)
+        folder = folder.parent
+    return missing[::-1]
 
 
 def free_path(path: Path) -> Path:

@@ -9,8 +9,9 @@ smallest distances, pairs, stop), both as the bytes on the wire, and its paramet
                                         (before compression)
 
 `hpccd replay` verifies a recording. Ctrl-C (SIGINT) and SIGTERM complete the file. After SIGKILL it lacks at most the
-last half second (--flush); `hpccd doctor` recovers it. On a write error (full disk), the file ends at its last whole
-chunk, lost messages are counted (exit status 1), and a new file is tried every 5 seconds.
+last half second (--flush); `hpccd doctor` recovers it. After a power failure it may lack more, unless it was made with
+--sync. On a write error (full disk), the file ends at its last whole chunk, lost messages are counted (exit status 1),
+and a new file is tried every 5 seconds.
 A node can also record itself: see its parameter `record`. If the node's topics are remapped, give the same remappings
 here, after --ros-args.
 """
@@ -52,6 +53,12 @@ def configure(parser):
         default=0.5,
         metavar="S",
         help="seconds of messages that SIGKILL can lose at most (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--sync",
+        action="store_true",
+        help="make the file durable (fsync) each time that messages are flushed: a power failure loses no more than "
+        "--flush and the time of two syncs",
     )
     parser.add_argument(
         "--depth",

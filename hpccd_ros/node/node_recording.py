@@ -133,6 +133,7 @@ class _Running:
             attachments=files,
             compression=settings["record_compression"],
             flush_interval=settings["record_flush"],
+            sync=settings["record_sync"],
             max_bytes=max_bytes,
             max_seconds=max_seconds,
         )
@@ -167,7 +168,7 @@ class _Running:
     def _run(self) -> None:
         try:
             while not self._stop.is_set():
-                self._executor.spin_once(timeout_sec=0.1)
+                self._executor.spin_once(timeout_sec=min(0.1, self.bag.until_flush))
                 self.bag.poll()
             self._recorder.finish(self._executor, DEPTH)
         except ExternalShutdownException:
@@ -197,7 +198,7 @@ class _Running:
             return DiagnosticStatus.ERROR, "the recording has ended by an error, see the node's output", values
         if self.bag.failing:
             return DiagnosticStatus.ERROR, f"nothing is written now: {self.bag.last_error}", values
-        if values["lost"] or values["not_written"]:
+        if values["lost"] or values["not_written"] or values["not_synced"]:
             return DiagnosticStatus.WARN, "the recording is not complete", values
         if missing := self._missing():
             return DiagnosticStatus.WARN, "; ".join(missing), values
@@ -212,7 +213,9 @@ class _Running:
             "flushed": bag.flushed_count,
             "bytes": bag.size,
             "lost": sum(self._recorder.lost.values()),
+            "synced": bag.synced_count,
             "not_written": bag.not_written.total(),
+            "not_synced": bag.not_synced,
             "write_errors": bag.write_errors,
             "last_error": bag.last_error,
         }

@@ -459,6 +459,14 @@ RECORDING_ROWS = (
         span=(0.0, 3600.0),
         change=ALWAYS,
     ),
+    Row(
+        "record_sync",
+        "bool",
+        False,
+        "Make the next recording durable (fsync) each time that messages are flushed, so that it survives a power "
+        "failure",
+        change=ALWAYS,
+    ),
 )
 
 STOP_ROWS = (

@@ -74,6 +74,7 @@ def _record(node, target, args, stop) -> int:
             attachments=files,
             compression=args.compression,
             flush_interval=args.flush,
+            sync=args.sync,
             max_bytes=int(args.split_size * 1e6),
             max_seconds=args.split_time,
         )
@@ -112,7 +113,7 @@ def _spin(node, recorder, bag, contacts, args, stop, missing):
     started = look = time.monotonic()
     ready = warned = waits = False
     while not stop:
-        executor.spin_once(timeout_sec=0.1)
+        executor.spin_once(timeout_sec=min(0.1, bag.until_flush))
         bag.poll()
         if not ready and recorder.publishers(contacts):
             ready = True
@@ -188,7 +189,9 @@ def _report(bag, recorder, missing):
         print(f"  {text}")
     files = bag.file_paths
     for path in bag.torn_files:
-        print(f"  {path} ends early, without index: `hpccd doctor {path} --recover OUT.mcap`")
+        print(f"  {path} is not complete: `hpccd doctor {path} --recover OUT.mcap`")
+    if bag.not_synced:
+        print(f"  {counted(bag.not_synced, 'message')} NOT SYNCED, which a power failure may take")
     if bag.write_errors:
         print(
             f"  {counted(bag.not_written.total(), 'message')} NOT WRITTEN, {counted(bag.write_errors, 'write error')}, "

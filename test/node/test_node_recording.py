@@ -232,6 +232,24 @@ def test_killed_node_keeps_what_was_flushed(tmp_path, compression):
         _replayed(tmp_path / f"saved{number}.mcap")
 
 
+@pytest.mark.parametrize(("flush", "sync"), [(0.2, True), (3600.0, False)])
+def test_flush_alone_closes_a_chunk(tmp_path, flush, sync):
+    """`record_flush` also holds while no message comes; without it, the open chunk is lost with a killed node."""
+    path = tmp_path / "run.mcap"
+    node = NodeProcess(tmp_path, {"meshes": ["cloth"], "record": str(path), "record_flush": flush, "record_sync": sync})
+    try:
+        node.peer.topology("cloth", FACES, N * N)
+        stream(node, range(10))
+        _, values = _recording(node, messages=20)  # a topology, positions, results
+        if flush < 10:
+            _, values = _recording(node, messages=20, flushed=20, synced=20)
+        node.stop(signal.SIGKILL)
+    finally:
+        node.close()
+    assert examine(path).message_count == (20 if flush < 10 else 0)
+    assert int(values["write_errors"]) == int(values["not_synced"]) == 0
+
+
 def test_own_recording_holds_what_was_sent(start_node, tmp_path):
     node = start_node({"meshes": ["cloth"], "record": str(tmp_path / "run"), "record_split_time": 0.5})
     node.peer.topology("cloth", FACES, N * N)

@@ -7,7 +7,6 @@ python test/support/attack.py --only crafted/bomb/3            one case, its out
 
 import argparse
 import collections
-import csv
 import faulthandler
 import functools
 import json
@@ -19,7 +18,6 @@ import subprocess
 import sys
 import tempfile
 import time
-import traceback
 from pathlib import Path
 
 import base_bags
@@ -124,7 +122,7 @@ def run_case(name: str, folder: Path) -> dict:
             (row,) = json.loads(table.read_text())
             outcomes[label] = row["result"]
             if row["result"] == "VERIFIED" or re.search("^VERIFIED", done.out, re.MULTILINE):
-                problems.extend(_lies(recording, row, steps, done.out))
+                problems.extend(recording_oracle.lies(recording, row, steps, done.out))
         return done
 
     sound = command("doctor", "doctor", path)
@@ -153,25 +151,6 @@ def run_case(name: str, folder: Path) -> dict:
         "memory": grown,
         "told": [*sound, *replayed],
     }
-
-
-def _lies(path, row, steps, told) -> list[str]:
-    try:
-        reader = recording_oracle.Oracle(path)
-        whys = reader.untruths()
-    except Exception:
-        return [f"replay: verified what the oracle cannot read: {traceback.format_exc()}"]
-    with open(steps, newline="") as stream:
-        equal = [r for r in csv.DictReader(stream) if r["result"] == "equal"]
-    verified = collections.Counter(tuple(int(r[name]) for name in ("step", "start_ns", "end_ns")) for r in equal)
-    true = collections.Counter(step for step, why in zip(reader.steps(), whys, strict=True) if why is None)
-    if wrong := verified - true:
-        return [f"replay: WRONG VERIFIED: {list(wrong)}; untrue are {list(zip(reader.steps(), whys, strict=True))}"]
-    said = re.search(r"([\d,]+) results? not verified: the step began", told)
-    untold = row["unverified"] + (int(said[1].replace(",", "")) if said else 0)
-    if row["verified"] + untold != len(reader.results):
-        return [f"replay: {row['verified']} results verified, the file has {len(reader.results)}"]
-    return []
 
 
 def _memory(reset=False) -> int:

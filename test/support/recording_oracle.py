@@ -3,10 +3,13 @@
 rosbags, and recomputed by the core from the recorded positions."""
 
 import contextlib
+import csv
 import itertools
 import json
+import re
 import tempfile
-from collections import defaultdict
+import traceback
+from collections import Counter, defaultdict
 from pathlib import Path
 
 import numpy as np
@@ -216,6 +219,26 @@ class Oracle:
                 (1, vertex[a][0], vertex[c][0], (vertex[a][1], vertex[b][1]), (vertex[c][1], vertex[d][1]), toc)
             )
         return rows
+
+
+def lies(path, row, steps, told) -> list[str]:
+    """What a replay verified and what is not so. row: of its JSON; steps: its CSV file; told: its output."""
+    try:
+        reader = Oracle(path)
+        whys = reader.untruths()
+    except Exception:
+        return [f"replay: verified what the oracle cannot read: {traceback.format_exc()}"]
+    with open(steps, newline="") as stream:
+        equal = [r for r in csv.DictReader(stream) if r["result"] == "equal"]
+    verified = Counter(tuple(int(r[name]) for name in ("step", "start_ns", "end_ns")) for r in equal)
+    true = Counter(step for step, why in zip(reader.steps(), whys, strict=True) if why is None)
+    if wrong := verified - true:
+        return [f"replay: WRONG VERIFIED: {list(wrong)}; untrue are {list(zip(reader.steps(), whys, strict=True))}"]
+    said = re.search(r"([\d,]+) results? not verified: the step began", told)
+    untold = row["unverified"] + (int(said[1].replace(",", "")) if said else 0)
+    if row["verified"] + untold != len(reader.results):
+        return [f"replay: {row['verified']} results verified, the file has {len(reader.results)}"]
+    return []
 
 
 def _columns(result, name):
