@@ -35,6 +35,7 @@ SUBJECTS = {
     "accuracy": "hard elementary and distance queries: false negatives and positives of each tier",
     "gpu": "the GPU backend: ms per frame with and without transfers, many worlds, stages",
     "rigid": "meshes moved by poses and joints: contacts compared with the truth, bounds, cost",
+    "record": "the writer of recordings with and without --sync: throughput, CPU time, waiting messages",
     "ros": "the node over DDS: latency compared with an echo, sustained rate, overload",
     "robot": "a robot beside a cloth over DDS, moved by joint states: results per second, latency",
     "stop": "the topic stop over DDS: random approaches, silence, publisher and node killed",

@@ -34,6 +34,7 @@ SUBJECTS = {
     "motion": ("rod-twist-like", "--size", "0.02", "--steps", "1", *ONE),
     "inside": ("--size", "0.02", "--points", "300", *ONE),
     "accuracy": ("--parts", "sweeps", "--sweep-queries", "40"),
+    "record": ("--megabytes", "2", "--seconds", "0.1", *ONE),
     "rigid": ("--parts", "truth,bounds", "--queries", "200"),
 }
 
@@ -69,6 +70,11 @@ def check_worlds(rows):
 def check_ropes(rows):
     assert [row["way"] for row in rows] == ["edges", "thin triangles", "cloth"]
     assert rows[0]["contacts"] == rows[1]["contacts"] > 0 and rows[0]["triangles"] == 0
+
+
+def check_record(rows):
+    assert [row["variant"] for row in rows] == ["no sync", "sync", "sync, slow disk"]
+    assert all(row["throughput"] > 0 and row["median_us"] <= row["largest_us"] for row in rows)
 
 
 def check_options(rows):
