@@ -47,7 +47,7 @@ LIST        := $(TREE)-sources.txt
 SOURCES := $(sort $(shell find CMakeLists.txt setup.py package.xml action cmake config launch msg srv scripts hpccd_ros hpccd_core \
   \( -name __pycache__ -o -name dist -o -path hpccd_core/tests \) -prune -o -type f -print))
 
-.PHONY: help venv demo bench test test-core test-python test-long test-gpu test-aarch64 sanitize coverage measure-coverage fuzz oracle docs lint format release-check pin clean distclean \
+.PHONY: help venv demo bench test test-core test-python test-long test-gpu test-aarch64 sanitize coverage measure-coverage fuzz fuzz-bytes oracle docs lint format release-check pin clean distclean \
   FORCE
 
 help: ## Show this list of targets
@@ -110,11 +110,18 @@ bench: venv oracle ## Run one benchmark (BENCH_ARGS="scaling"; by default, list 
 fuzz: venv oracle ## Compare the core with the exact oracle on random and degenerate queries (FUZZ_ARGS=--help)
 	PYTHONPATH=test:build/oracle $(BIN)/python -m fuzz $(FUZZ_ARGS)
 
+fuzz-bytes: venv $(VENV)/.hpccd-fuzz ## Fuzz what reads messages, recordings and files, by coverage (FUZZ_ARGS=--help)
+	PYTHONPATH=test:test/support $(BIN)/python -m fuzz_bytes $(FUZZ_ARGS)
+
+# Atheris and Sphinx are not part of the environment: make demo would install them for nothing.
+$(VENV)/.hpccd-fuzz: $(ENVIRONMENT)
+	@bash scripts/create_venv.sh $(VENV) $(EXTRAS) fuzz
+	@touch $@
+
 docs: $(INSTALLED) $(VENV)/.hpccd-docs ## Build the documentation as a site in build/site
 	$(BIN)/sphinx-build --fail-on-warning --keep-going --quiet --jobs $(JOBS) docs build/site
 	@echo "hpccd: open build/site/index.html"
 
-# Sphinx is not part of the environment: make demo would install it for nothing.
 $(VENV)/.hpccd-docs: $(ENVIRONMENT)
 	@bash scripts/create_venv.sh $(VENV) $(EXTRAS) docs
 	@touch $@
