@@ -11,6 +11,7 @@ from ..mesh_files.errors import MeshFileError, shortened
 from .packages import needed
 from .sequence import FrameSequence, SequenceError, SequenceMesh
 from .topology import checked_polygons, same_or, short_names
+from .usd_crate import check_counts
 
 SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 _LEFT_OUT = ("guide", "proxy")  # purposes
@@ -52,8 +53,13 @@ class UsdStage(FrameSequence):
     def _stage(self) -> Any:
         if "stage" not in self._opened:
             usd, tf = self._module("Usd"), self._module("Tf")
+            check_counts(self._path)
             try:
                 stage = usd.Stage.Open(str(self._path))
+                # USD shares layers of the process, as they were read first. Those with changes are the caller's.
+                for layer in stage.GetUsedLayers():
+                    if not layer.dirty:
+                        layer.Reload()
             except tf.ErrorException:
                 raise SequenceError(f"{self._path}: cannot be opened as USD; copy or export it again") from None
             if errors := stage.GetCompositionErrors():

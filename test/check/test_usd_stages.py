@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """USD: transforms, units, time samples, topology, and prims that are left out."""
 
+import os
+
 import numpy as np
 import pytest
 
@@ -159,6 +161,21 @@ def test_prims_that_are_left_out_are_named(tmp_path):
         "subdivision surfaces (1): their control meshes are used",
         "holes of meshes (1) are filled",
     )
+
+
+def test_a_file_that_was_written_again(tmp_path):
+    """USD shares the layers of a process, and sequences keep their stages open for a while."""
+    path, text = tmp_path / "a.usda", tmp_path / "b.usda"
+    for x, file in ((0, path), (5, text)):
+        stage = stage_of(file)
+        add(stage, "/m", [(x, y, z) for x, y, z in np.array(SQUARE, float) + [x, 0, 0]])
+        stage.Save()
+    before = open_sequence(path)
+    assert before.frame(0).vertices.max() == 1
+    del stage
+    path.write_text(text.read_text())
+    os.utime(path, (2e9, 2e9))
+    assert open_sequence(path).frame(0).vertices.max() == 6
 
 
 def test_references_and_instances(tmp_path):
