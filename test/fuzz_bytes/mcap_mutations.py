@@ -13,6 +13,7 @@ import lz4.frame
 import zstandard
 
 from .cdr_mutations import with_number
+from .json_mutations import changed_json
 from .mutations import NUMBERS, Mutate
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -173,7 +174,7 @@ def _change_map(rng: Random, data: bytes, mutate: Mutate) -> bytes:
     if rng.random() < 0.3:
         values[0] = mutate(values[0], len(values[0]) + 100)
     else:
-        values[0] = json.dumps(_change_json(rng, tree)).encode("utf-8", "replace")
+        values[0] = json.dumps(changed_json(rng, tree)).encode("utf-8", "replace")
     return b"".join(struct.pack("<I", len(text)) + text for text in (key, *values))
 
 
@@ -184,44 +185,6 @@ def _texts(data: bytes) -> list[bytes]:
         found.append(data[at + 4 : at + 4 + length])
         at += 4 + length
     return found
-
-
-_VALUES = (
-    None,
-    True,
-    False,
-    0,
-    1,
-    -1,
-    2**63,
-    1e308,
-    -0.5,
-    "",
-    "a",
-    "cloth",
-    "tf",
-    "points",
-    "*",
-    [],
-    ["a", "cloth"],
-    {},
-    [0],
-)
-
-
-def _change_json(rng: Random, tree):
-    if isinstance(tree, dict) and tree and rng.random() < 0.95:
-        key = rng.choice(list(tree))
-        if rng.random() < 0.1:
-            return {name: value for name, value in tree.items() if name != key}
-        if rng.random() < 0.1:
-            return tree | {f"{key}{rng.choice('.x/ ')}": tree[key]}
-        return tree | {key: _change_json(rng, tree[key])}
-    if isinstance(tree, list) and tree and rng.random() < 0.8:
-        at = rng.randrange(len(tree))
-        changed = rng.choice(([], [tree[at]] * 2, [_change_json(rng, tree[at])]))
-        return tree[:at] + changed + tree[at + 1 :]
-    return rng.choice(_VALUES)
 
 
 def _repaired(found: list[Record], lacking: str) -> bytes:

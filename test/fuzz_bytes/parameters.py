@@ -9,6 +9,7 @@ from hpccd_ros.params.table import NODE_ROWS
 from hpccd_ros.params.values import ParameterError
 from hpccd_ros.replay import playback
 
+from .json_mutations import mutate_json
 from .target import Target, file_of
 
 _FILE = b"""/**:
@@ -93,7 +94,12 @@ _OFFERS = b"- depth: 10\n  reliability: reliable\n  durability: transient_local\
 TARGETS = {
     "file": Target(_read_file, lambda: [_FILE, _OTHER], (UserError,), words=_WORDS, largest=200),
     "settings": Target(
-        _read_settings, lambda: [json.dumps(_VALUES).encode()], (ParameterError,), words=_NAMES, largest=1500
+        _read_settings,
+        lambda: [json.dumps(_VALUES).encode()],
+        (ParameterError,),
+        mutate_json,
+        words=_NAMES,
+        largest=1500,
     ),
     "value": Target(
         _read_value, lambda: [b"[1, 2.5]", b"0x1f", b"2001-01-01", b"{a: true}"], (), words=_WORDS, largest=100

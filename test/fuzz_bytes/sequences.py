@@ -2,6 +2,7 @@
 """Files of sequences, as `hpccd-check` reads them: VTK, VTU, glTF, GLB, arrays, point caches, USD."""
 
 import base64
+import importlib
 import io
 import itertools
 import json
@@ -12,7 +13,8 @@ import numpy as np
 from hpccd_core import MeshFileError
 from hpccd_core.sequences.opening import open_sequence
 
-from .target import Target, file_of
+from .json_mutations import mutate_json
+from .target import Target, file_of, missing
 
 _MOST_FRAMES = 3
 _POINTS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
@@ -160,6 +162,15 @@ def Xform "a" {
     }
 }
 """
+
+
+def _usdc() -> list[bytes]:
+    usd, target = importlib.import_module("pxr.Usd"), missing("seed.usdc")
+    stage = usd.Stage.Open(str(file_of(_USDA, "seed.usda")))
+    stage.GetRootLayer().Export(str(target))
+    return [target.read_bytes()]
+
+
 _VTK_WORDS = (
     b"POINTS ", b"POLYGONS ", b"CELLS ", b"CELL_TYPES ", b"OFFSETS vtktypeint64\n", b"CONNECTIVITY int\n", b"LINES ",
     b"VERTICES ", b"METADATA\n", b"FIELD a 1\n", b"TRIANGLE_STRIPS ", b"POINT_DATA ", b"BINARY", b" -1 ", b"double",
@@ -195,22 +206,34 @@ _USD_WORDS = (
 def _reader(suffix: str, seeds, words: tuple[bytes, ...], *, faces: bool = False, **options) -> Target:
     def read(data: bytes) -> None:
         of_faces = file_of(_OBJ, "faces.obj") if faces else None
-        sequence = open_sequence(file_of(data, f"input{suffix}"), faces=of_faces)
-        for frame in itertools.islice(sequence, _MOST_FRAMES):
-            assert len(frame.vertices) == sum(mesh.n_vertices for mesh in frame.meshes)
-            assert all(not len(mesh.faces) or mesh.faces.max() < mesh.n_vertices for mesh in frame.meshes)
+        # Another name each time: USD shares layers of one path.
+        path = file_of(data, f"input{next(_numbers)}{suffix}")
+        try:
+            _check(open_sequence(path, faces=of_faces))
+        finally:
+            path.unlink()
 
     return Target(read, seeds, (MeshFileError,), words=words, **options)
+
+
+def _check(sequence) -> None:
+    for frame in itertools.islice(sequence, _MOST_FRAMES):
+        assert len(frame.vertices) == sum(mesh.n_vertices for mesh in frame.meshes)
+        assert all(not len(mesh.faces) or mesh.faces.max() < mesh.n_vertices for mesh in frame.meshes)
+
+
+_numbers = itertools.count()
 
 
 TARGETS = {
     "vtk": _reader(".vtk", _vtk, _VTK_WORDS, largest=800),
     "vtu": _reader(".vtu", _vtu, _VTU_WORDS, largest=2000, needs=("meshio",)),
-    "gltf": _reader(".gltf", _gltf_texts, _GLTF_WORDS, largest=4000),
+    "gltf": _reader(".gltf", _gltf_texts, _GLTF_WORDS, largest=4000, mutate=mutate_json),
     "glb": _reader(".glb", _glb, _GLTF_WORDS, largest=4000),
     "npz": _reader(".npz", _npz, _ARRAY_WORDS, largest=3000),
     "npy": _reader(".npy", _npy, _ARRAY_WORDS, faces=True, largest=500),
     "pc2": _reader(".pc2", _pc2, (), faces=True, largest=300),
     "mdd": _reader(".mdd", _mdd, (), faces=True, largest=300),
+    "usdc": _reader(".usdc", _usdc, (), largest=6000, needs=("pxr",), native=True),
     "usd": _reader(".usda", lambda: [_USDA], _USD_WORDS, largest=2000, needs=("pxr",)),
 }

@@ -26,7 +26,8 @@ class Target:
 
     ``seeds``: valid inputs. ``mutate``: (random generator, input, mutation of bytes) -> another input, for formats with
     lengths or checksums. ``largest``: bytes of an input. ``words``: of the format, put into inputs. ``seconds``: for
-    one input. ``needs``: packages of extras.
+    one input. ``needs``: packages of extras. ``native``: it is read by a library that damaged inputs may crash, so that
+    the test suite makes no new ones.
     """
 
     read: Callable[[bytes], object]
@@ -37,6 +38,7 @@ class Target:
     words: tuple[bytes, ...] = field(default=(), repr=False)
     seconds: int = 10
     needs: tuple[str, ...] = ()
+    native: bool = False
 
     def __call__(self, data: bytes) -> None:
         try:

@@ -48,6 +48,8 @@ def test_stored_inputs(target):
 
 def test_mutations(target):
     name, of = target
+    if of.native:
+        pytest.skip("damaged inputs may crash its library")
     inputs, rng = _inputs(name, of), Random(name)
     change = mutation(rng, of.words, of.largest)
     for _ in range(MUTATIONS):
