@@ -2,7 +2,9 @@
 // Wherever memory ends: std::bad_alloc is thrown, and the next call works as if nothing had happened.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
+#include <bit>
 #include <cstddef>
 #include <cstdlib>
 #include <functional>
@@ -10,11 +12,13 @@
 #include <new>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "grid_scene.h"
 #include "hpccd/hpccd.h"
 #include "paper/shared_pairs.h"
+#include "sheets_and_solids.h"
 #include "soup_scene.h"
 
 namespace {
@@ -75,9 +79,64 @@ constexpr std::uint32_t n_triangles = 40;
 
 struct Case {
   std::string name;
+  std::shared_ptr<const Scene> scene;
   Options options;
   std::function<std::uint64_t(Detector&)> ask;
+
+  // The allocation to fail after the nth. Searches with long integers make thousands, most of which are alike.
+  long after(long n) const {
+    const bool with_integers = name.starts_with("translation") || name.starts_with("penetration");
+    return n + 1 + (with_integers ? n / 16 : 0);
+  }
 };
+
+// A number that two results share only if they are alike.
+class Digest {
+ public:
+  template <class T>
+  Digest& operator<<(const T& x) {
+    if constexpr (std::is_floating_point_v<T>)
+      mix(std::bit_cast<std::uint64_t>(x));
+    else if constexpr (std::is_integral_v<T>)
+      mix(static_cast<std::uint64_t>(x));
+    else
+      for (const auto& row : x) *this << row;
+    return *this;
+  }
+  operator std::uint64_t() const { return value_; }
+
+ private:
+  void mix(std::uint64_t x) {
+    value_ = (value_ ^ x) * 0x9E3779B97F4A7C15u;
+    value_ ^= value_ >> 32;
+  }
+  std::uint64_t value_ = 0;
+};
+
+// Two spheres with shapes above a plane, with whatever a detector of a scene prepares.
+std::shared_ptr<const Scene> solids_scene() {
+  const test::Body sphere = test::sphere(2, 1);
+  const auto n = static_cast<std::uint32_t>(sphere.positions.size() / 3);
+  auto scene = std::make_shared<Scene>();
+  scene->add_mesh("first", sphere.faces, n);
+  scene->add_mesh("second", sphere.faces, n);
+  scene->add_plane("floor", {{0, 0, 1}, -1.05});
+  for (const std::uint32_t mesh : {0, 1}) scene->set_shape(mesh, sphere.positions);
+  scene->set_thickness(0, std::vector<double>{0.01});
+  scene->ignore_within(0, 2);
+  scene->ignore_within(1, {sphere.positions, 0.9});
+  scene->ignore_faces(1, std::vector<std::uint32_t>{3}, 0);
+  scene->ignore_features(std::vector<std::array<std::uint32_t, 2>>{{0, n}}, {});
+  return scene;
+}
+
+// The second sphere is moved by x, and smaller.
+std::vector<double> solid_positions(double x, double size = 0.9) {
+  std::vector<double> positions = test::sphere(2, 1).positions;
+  const std::vector<double> second = test::moved(test::sphere(2, size), {x, 0.1, 0.05}).positions;
+  positions.insert(positions.end(), second.begin(), second.end());
+  return positions;
+}
 
 std::vector<Case> cases() {
   static const std::vector<double> start = test::soup_positions(n_triangles, 1),
@@ -92,14 +151,16 @@ std::vector<Case> cases() {
     d.collision_free_step(view(start), view(near));
     return static_cast<std::uint64_t>(1e15 * d.collision_free_step(view(start), view(near)));
   };
+  const auto soup = test::soup_scene(n_triangles);
   std::vector<Case> all;
   for (const int threads : {1, 2}) {
+    auto scene = soup;
     const std::string suffix = ", " + std::to_string(threads) + " threads";
     const auto add = [&](std::string name, auto ask, auto change) {
       Options o;
       o.threads = threads, o.closest = true;
       change(o);
-      all.push_back({name + suffix, o, ask});
+      all.push_back({name + suffix, scene, o, ask});
     };
     const auto as_it_is = [](Options&) {};
     add("all", detect, as_it_is);
@@ -117,6 +178,83 @@ std::vector<Case> cases() {
     add(
         "distances", [](Detector& d) { return static_cast<std::uint64_t>(1e9 * d.distances(view(start))[0].distance); },
         as_it_is);
+    scene = solids_scene();
+    static const std::vector<double> apart = solid_positions(1.9), closer = solid_positions(0.7);
+    const auto everything = [](Options& o) {
+      o.points = o.normals = o.closest = o.weights = true, o.minimum_separation = 0.01;
+    };
+    add(
+        "all outputs",
+        [](Detector& d) {
+          const Contacts c = d.detect(view(apart), view(closer));
+          return Digest() << c.hash << c.points << c.normals << c.weights << c.approach << c.vp_toc;
+        },
+        everything);
+    add(
+        "motion", [](Detector& d) { return Digest() << d.collision_free_motion(view(apart), view(closer)).factors; },
+        as_it_is);
+    add(
+        "motion of groups",
+        [](Detector& d) {
+          const std::vector<std::int64_t> groups(apart.size() / 3, 0);
+          return Digest() << d.collision_free_motion(view(apart), view(closer), groups).factors;
+        },
+        as_it_is);
+    add(
+        "places of intersections",
+        [](Detector& d) {
+          const Intersections i = d.intersections(view(closer));
+          Digest digest;
+          digest << i.hash << i.points << i.directions;
+          for (const Contour& c : contours(d.scene(), i)) digest << c.rows;
+          for (const EnclosedRegion& r : enclosed_regions(d.scene(), i)) digest << r.vertices_b;
+          return digest;
+        },
+        [](Options& o) { o.points = o.directions = true; });
+    add(
+        "outputs of proximity",
+        [](Detector& d) {
+          const Proximity p = d.proximity(view(closer), 0.3);
+          return Digest() << p.hash << p.closest << p.normals << p.weights << p.vp_distance;
+        },
+        [](Options& o) { o.normals = o.closest = o.weights = true; });
+    add(
+        "inside",
+        [](Detector& d) {
+          static const std::vector<double> small = solid_positions(0.05, 0.2);
+          Digest digest;
+          for (const Gap& g : d.distances(view(small))) digest << g.distance << static_cast<int>(g.inside);
+          return digest;
+        },
+        as_it_is);
+    add(
+        "points",
+        [](Detector& d) {
+          return Digest() << d.winding_numbers(view(closer), view(apart), 0).on_surface
+                          << d.signed_distances(view(closer), view(apart), 1).distance;
+        },
+        as_it_is);
+    add(
+        "translation",
+        [](Detector& d) { return Digest() << d.separating_translation(view(closer), 0, 1, {1, 0.2, 0}); }, as_it_is);
+    add("penetration", [](Detector& d) { return Digest() << d.penetration(view(closer), 0, 1).translation; }, as_it_is);
+    add(
+        "poses",
+        [](Detector& d) {
+          const Pose poses[] = {{}, {{0.7, 0.1, 0}, {0, 0, 0.6, 0.8}}};
+          return Digest() << d.proximity_at(poses, 0.3).hash << d.intersections_at(poses).hash
+                          << d.distances_at(poses)[0].distance << d.positions_at(poses);
+        },
+        as_it_is);
+    add(
+        "changes",
+        [](Detector& d) {
+          d.set_separation(0, 1, 0.2);
+          d.set_thickness(1, std::vector<double>{0.05});
+          d.set_plane(2, {{0, 0.1, 1}, -2});
+          return d.detect(view(apart), view(closer)).hash;
+        },
+        as_it_is);
   }
   return all;
 }
@@ -124,14 +262,13 @@ std::vector<Case> cases() {
 class MemoryEnds : public testing::TestWithParam<Case> {};
 
 TEST_P(MemoryEnds, InACall) {
-  const auto& [name, options, ask] = GetParam();
-  const auto scene = test::soup_scene(n_triangles);
+  const auto& [name, scene, options, ask] = GetParam();
   const std::uint64_t expected = [&] {
     Detector d(scene, options);
     return ask(d);
   }();
-  long n = 0, ended = 0;
-  for (;; ++n) {
+  long tried = 0, ended = 0;
+  for (long n = 0;; n = GetParam().after(n), ++tried) {
     Detector d(scene, options);
     const std::optional<bool> e = ends(n, [&] { EXPECT_EQ(ask(d), expected); });
     ASSERT_EQ(ask(d), expected) << "after allocation " << n;
@@ -139,15 +276,16 @@ TEST_P(MemoryEnds, InACall) {
     if (!e) break;
     ended += *e;
   }
-  EXPECT_GT(n, some);
-  EXPECT_EQ(ended, n);
+  EXPECT_GT(tried, some);
+  // std::stable_sort does without the memory that it cannot have.
+  EXPECT_GE(ended, tried - 2);
 }
 
 TEST_P(MemoryEnds, InALaterCall) {
-  const auto& [name, options, ask] = GetParam();
-  Detector d(test::soup_scene(n_triangles), options);
+  const auto& [name, scene, options, ask] = GetParam();
+  Detector d(scene, options);
   const std::uint64_t expected = ask(d);
-  for (long n = 0;; ++n) {
+  for (long n = 0;; n = GetParam().after(n)) {
     const std::optional<bool> e = ends(n, [&] { EXPECT_EQ(ask(d), expected); });
     ASSERT_EQ(ask(d), expected) << "after allocation " << n;
     if (!e) break;
@@ -161,14 +299,14 @@ INSTANTIATE_TEST_SUITE_P(Calls, MemoryEnds, testing::ValuesIn(cases()), [](const
 });
 
 TEST(MemoryEnds, WhereADetectorIsMade) {
-  const auto scene = test::soup_scene(n_triangles);
-  for (const int threads : {1, 3}) {
-    Options options;
-    options.threads = threads, options.worlds = 3;
-    long n = 0;
-    while (ends(n, [&] { Detector(scene, options); })) ++n;
-    EXPECT_GT(n, some);
-  }
+  for (const auto& scene : {test::soup_scene(n_triangles), solids_scene()})
+    for (const int threads : {1, 3}) {
+      Options options;
+      options.threads = threads, options.worlds = 3;
+      long n = 0;
+      while (ends(n, [&] { Detector(scene, options); })) ++n;
+      EXPECT_GT(n, some);
+    }
 }
 
 TEST(MemoryEnds, InACallOfManyWorlds) {
