@@ -41,8 +41,9 @@ def test_cut_at_every_byte(tmp_path, compression, every, tail):
     if not every:
         lengths = sorted({*random.Random(2).sample(lengths, SAMPLE), chunks[-1][0], chunks[-1][1], len(data) - 1})
     for length in lengths:
-        cut.write_bytes(data[:length] + tail)
-        kept = max(count for _, end, count in chunks if end <= length)
+        content = data[:length] + tail  # zeros may replace zeros
+        cut.write_bytes(content)
+        kept = max(count for _, end, count in chunks if content[:end] == data[:end])
         found = examine(cut)
         assert not found.sound and found.message_count == kept, length
         recover(cut, saved)
