@@ -13,6 +13,8 @@ from hypothesis.stateful import RuleBasedStateMachine, precondition, rule, run_s
 from lifecycle_msgs.msg import Transition
 from node_calls import change_state, set_parameter
 
+from hpccd_ros.middleware import fields
+
 TIMEOUT = 2.0
 FAR, BETWEEN, CLOSE = 3.0, 1.0, 0.1  # heights of the hand above the table
 DISTANCES = 0.25, 1.5  # BETWEEN is near for the second
@@ -42,7 +44,7 @@ class StopMachine(RuleBasedStateMachine):
 
     def settle(self):
         """Where stop must be true it becomes so, and stays so until it may be false again."""
-        if self.allowed():
+        if self.allowed():  # it becomes false with the next frame
             return
         since, stream = time.monotonic(), self.stream
         stream.expect(True)
@@ -59,22 +61,30 @@ class StopMachine(RuleBasedStateMachine):
     @rule()
     @precondition(lambda self: self.active)
     def clear(self):
-        """Frames arrive until stop is false, which it must become."""
-        stream, height = self.stream, FAR
-        self.heights = [FAR, FAR]
-        self.unknown = False
+        self.heights, self.unknown = [FAR, FAR], False
+        self.become_false(FAR)
+
+    def become_false(self, height):
+        """Frames arrive until stop is false, which it must become. Afterwards none waits for its detection."""
+        stream = self.stream
         with stream.steady(height):
             stream.expect(False)
+        received = stream.node.peer.received
+        stream.node.wait_until(
+            lambda: received and fields.stamp_to_ns(received[-1].header.stamp) == stream.sent, "the last step"
+        )
 
     def frame(self, height):
-        assert all(said for _, said in self.stream.heard[self.heard :]) or self.allowed()
-        self.stream.frame(height)
         if math.isnan(height):
             self.unknown = True
         elif self.active:
             self.heights.append(height)
             self.unknown = False
-        self.settle()
+        if self.allowed() and not math.isnan(height):
+            self.become_false(height)
+        else:
+            self.stream.frame(height)
+            self.settle()
 
     @rule()
     def far(self):
