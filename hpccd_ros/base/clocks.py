@@ -27,8 +27,8 @@ class ClockWatch:
     s.
 
     If a clock is set back after it dated a message, the message seems younger by this amount. So the wait is longer by
-    this amount, up to 10 s; then such a message seems older than ``wait``. Messages received during the wait never
-    count. Not thread-safe.
+    this amount, or by the sum of several that follow each other, up to 10 s; then such a message seems older than
+    ``wait``. Messages received during the wait never count. Not thread-safe.
     """
 
     def __init__(self, error: float, wait: float) -> None:
@@ -46,7 +46,9 @@ class ClockWatch:
             self._offset = offset
         jump, slew = offset - self._offset, _SLEW * (steady - self._steady)
         if abs(jump) > self._error + slew:
-            self._doubt(steady, max(-jump, 0.0), f"the system clock jumped by {jump:+.3g} s against the steady clock")
+            # A message sent before an earlier jump seems younger by this one too.
+            back, rest = max(-jump, 0.0), max(self._until - steady - self._wait, 0.0)
+            self._doubt(steady, rest + back, f"the system clock jumped by {jump:+.3g} s against the steady clock")
             self._offset = offset
         else:
             self._offset += min(max(jump, -slew), slew)

@@ -336,6 +336,21 @@ def test_a_jump_of_the_system_clock(state, jump):
     assert cause(state) is None
 
 
+def test_a_message_before_two_jumps_never_seems_young(state):
+    """It seems younger by both: found by the search of test_stop_in_every_order.py."""
+    clear(state)
+    assert cause(state) is None
+    sent = state.times.now
+    for _ in range(2):
+        state.times.now -= 7 * SECOND
+        assert cause(state) == "clocks"
+    for _ in range(19):
+        state.times.pass_by(TIMEOUT / 10)
+        assert cause(state) == "clocks"
+    clear(state, hand=sent, tip=sent)
+    assert cause(state) == "clocks"
+
+
 def test_what_was_sent_before_a_clock_was_set_back_never_seems_young(state):
     """Nothing is sent any more: messages in use seem younger than they are, by as much as the clock was set back."""
     for jump in (0.4, 5.0, 30.0):
