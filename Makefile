@@ -96,7 +96,7 @@ sanitize: $(ENVIRONMENT) ## Run the C++ tests under AddressSanitizer and UBSan, 
 	@$(call run_core_tests,build/core-asan,-DCMAKE_BUILD_TYPE=RelWithDebInfo -DHPCCD_SANITIZE=address$(comma)undefined)
 	@$(call run_core_tests,build/core-tsan,-DCMAKE_BUILD_TYPE=RelWithDebInfo -DHPCCD_SANITIZE=thread)
 
-coverage: ## Run all tests in a second environment that counts lines; write build/coverage (an hour on two cores)
+coverage: ## Run all tests in a second environment that counts lines; write build/coverage
 	@$(MAKE) --no-print-directory VENV=$(COUNTED) EXTRAS="$(EXTRAS) coverage" HPCCD_CUDA=OFF \
 	  CMAKE_ARGS="$(CMAKE_ARGS) -DHPCCD_COVERAGE=ON" measure-coverage
 

@@ -61,7 +61,7 @@ def _write(bag, numbers):
 
 
 def _synced(bag, count):
-    """Wait until the thread has made so many messages durable."""
+    """Wait until the thread has made `count` messages durable."""
     deadline = threading.Event()
     for _ in range(int(PATIENCE / 0.01)):
         if bag.synced_count >= count:

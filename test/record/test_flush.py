@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The promise of --flush: a SIGKILL loses no message that was taken more than so many seconds before."""
+"""The promise of --flush: a SIGKILL loses no message that was received longer before it than the given seconds."""
 
 import math
 import os

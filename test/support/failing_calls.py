@@ -3,7 +3,7 @@
 
 python test/support/failing_calls.py                     all of it; a table of calls, errors and outcomes
 python test/support/failing_calls.py --only record       one scenario
-python test/support/failing_calls.py --points 3          at most so many points of each call
+python test/support/failing_calls.py --points 3          at most 3 points of each call
 """
 
 import argparse
